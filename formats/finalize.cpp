@@ -276,6 +276,7 @@ void add_features(const Scene& scene, const Material& m, Features& f) {
         f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
         f.map_rules |= b.map_rules != 0;
         f.coats |= b.coat != kNone;
+        f.phong_facets |= has_microfacets(b, Microfacets::phong);
     }
     if (m.first == kNone) return;
     f.blends = true;

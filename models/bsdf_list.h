@@ -112,6 +112,17 @@ inline bool is_textured(const BsdfRecord& record) {
     });
 }
 
+/// True if its microfacets are of that distribution.
+inline bool has_microfacets(const BsdfRecord& record, Microfacets distribution) {
+    return BsdfModels::visit<BsdfModels::kAll>(uint32_t(record.type), false, [&](auto model) {
+        const auto& parameters = record.as<typename decltype(model)::type>();
+        if constexpr (requires { parameters.distribution; })
+            return parameters.distribution == distribution;
+        else
+            return false;
+    });
+}
+
 template <class Model>
 BsdfRecord bsdf_record(const Textured<Model>& parameters) {
     BsdfRecord record;

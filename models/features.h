@@ -12,17 +12,18 @@ namespace ambilux {
 
 /// Set of features. Structural, so that it can be a template argument.
 struct Features {
-    uint32_t bsdfs = 0;       ///< bit per BsdfType
-    uint32_t emitters = 0;    ///< bit per EmitterType
-    uint32_t primitives = 0;  ///< bit per PrimitiveType
-    bool textures = false;    ///< any parameter comes from a texture
-    bool bumps = false;       ///< any bump or normal map
-    bool opacity = false;     ///< any surface that lets rays pass at random
-    bool blends = false;      ///< any surface of two materials
-    bool coats = false;       ///< any coating
-    bool map_rules = false;   ///< any map with MapRules
-    bool instances = false;   ///< any group of triangles in several places (scene/view.h, Instance)
-    bool latlong = false;     ///< a sensor of all directions (models/sensor_list.h)
+    uint32_t bsdfs = 0;         ///< bit per BsdfType
+    uint32_t emitters = 0;      ///< bit per EmitterType
+    uint32_t primitives = 0;    ///< bit per PrimitiveType
+    bool textures = false;      ///< any parameter comes from a texture
+    bool bumps = false;         ///< any bump or normal map
+    bool opacity = false;       ///< any surface that lets rays pass at random
+    bool blends = false;        ///< any surface of two materials
+    bool coats = false;         ///< any coating
+    bool map_rules = false;     ///< any map with MapRules
+    bool instances = false;     ///< any group of triangles in several places (scene/view.h, Instance)
+    bool latlong = false;       ///< a sensor of all directions (models/sensor_list.h)
+    bool phong_facets = false;  ///< any BSDF with Microfacets::phong
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -37,7 +38,7 @@ struct Features {
         return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
                (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
                (blends || !other.blends) && (coats || !other.coats) && (map_rules || !other.map_rules) &&
-               (instances || !other.instances) && (latlong || !other.latlong);
+               (instances || !other.instances) && (latlong || !other.latlong) && (phong_facets || !other.phong_facets);
     }
     constexpr bool operator==(const Features&) const = default;
 };
@@ -49,6 +50,7 @@ constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 constexpr Features kAllFeatures = {BsdfModels::kAll,
                                    EmitterModels::kAll,
                                    (1u << uint32_t(PrimitiveType::count)) - 1,
+                                   true,
                                    true,
                                    true,
                                    true,

@@ -29,6 +29,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.blends) names.push_back("blends");
     if (f.coats) names.push_back("coatings");
     if (f.map_rules) names.push_back("rules of maps");
+    if (f.phong_facets) names.push_back("phong microfacets");
     if (f.instances) names.push_back("instances");
     if (f.latlong) names.push_back("spherical sensor");
     return names;

@@ -40,6 +40,13 @@ template <Features F, typename Result, typename Op>
 AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
     return visit_bsdf<F>(b.type, otherwise, [&](auto model) -> Result {
         using Model = typename decltype(model)::type;
+        if constexpr (F.phong_facets && requires { b.as<Model>().distribution; })
+            if (b.as<Model>().distribution == Microfacets::phong) {
+                if constexpr (Model::tabulated)
+                    return op(BsdfAt<Model, PhongFacets>{b.as<Model>(), b.tables});
+                else
+                    return op(BsdfAt<Model, PhongFacets>{b.as<Model>()});
+            }
         if constexpr (Model::tabulated)
             return op(BsdfAt<Model>{b.as<Model>(), b.tables});
         else

@@ -14,14 +14,16 @@ void add_ior(xml_node node, float ior) {
     add_number(node, "ext_ior", 1);
 }
 
-void add_distribution(xml_node node, Microfacets distribution, bool sample_visible = true) {
-    add_text(node, "distribution", distribution == Microfacets::ggx ? "ggx" : "beckmann");
+void add_distribution(Writer& w, xml_node node, Microfacets distribution, bool sample_visible = true) {
+    constexpr const char* names[] = {"beckmann", "ggx", "phong"};
+    add_text(node, "distribution", names[uint32_t(distribution)]);
+    if (distribution == Microfacets::phong) w.note("Mitsuba 3 has no microfacet distribution 'phong'");
     if (!sample_visible) add_boolean(node, "sample_visible", false);
 }
 
 template <class P>
 void add_roughness(Writer& w, xml_node node, const P& p) {
-    add_distribution(node, p.distribution, p.sample_visible);
+    add_distribution(w, node, p.distribution, p.sample_visible);
     add_textured_number(w, node, "alpha_u", p.alpha_u);
     add_textured_number(w, node, "alpha_v", p.alpha_v);
 }
@@ -79,7 +81,7 @@ void add_parameters(Writer& w, xml_node node, const Textured<RoughDielectric>& p
 void add_parameters(Writer& w, xml_node node, const Textured<Plastic>& p) { add_coating(w, node, p); }
 void add_parameters(Writer& w, xml_node node, const Textured<RoughPlastic>& p) {
     add_coating(w, node, p);
-    add_distribution(node, p.distribution, p.sample_visible);
+    add_distribution(w, node, p.distribution, p.sample_visible);
     add_number(node, "alpha", p.alpha.value);
 }
 void add_parameters(Writer& w, xml_node node, const Textured<Phong>& p) {

@@ -10,13 +10,20 @@ namespace ambilux::document {
 Microfacets read_distribution(Builder& builder, Reader& in) {
     const std::string name = in.text("distribution", "beckmann");
     if (name == "ggx") return Microfacets::ggx;
+    if (name == "phong" || name == "as") return Microfacets::phong;  // one and the same in Mitsuba 0.6
     if (name != "beckmann")
         builder.refuse(in.where("distribution"),
-                       "microfacet distribution '" + name + "' is not supported (beckmann, ggx)", "beckmann is used");
+                       "microfacet distribution '" + name + "' is not supported (beckmann, ggx, phong, as)",
+                       "beckmann is used");
     return Microfacets::beckmann;
 }
 
 namespace {
+
+/// Visible normals are not sampled of phong's distribution, as in Mitsuba 0.6.
+bool read_visible(Reader& in, Microfacets distribution) {
+    return in.boolean("sample_visible", true) && distribution != Microfacets::phong;
+}
 
 template <class Parameters>
 void read_roughness(Builder& builder, Reader& in, Parameters& p) {
@@ -32,7 +39,7 @@ void read_roughness(Builder& builder, Reader& in, Parameters& p) {
     }
     for (const ParamFloat& alpha : {p.alpha_u, p.alpha_v})
         if (!(alpha.value >= 0)) in.fail(in.where(anisotropic ? "alpha_u" : "alpha"), "roughness must not be negative");
-    p.sample_visible = in.boolean("sample_visible", true);
+    p.sample_visible = read_visible(in, p.distribution);
 }
 
 float read_ior(Reader& in, const char* default_interior) {
@@ -153,7 +160,7 @@ void read_plugin(Builder& builder, Reader& in, Textured<Plastic>& p) {
 void read_plugin(Builder& builder, Reader& in, Textured<RoughPlastic>& p) {
     read_plastic(builder, in, p);
     p.distribution = read_distribution(builder, in);
-    p.sample_visible = in.boolean("sample_visible", true);
+    p.sample_visible = read_visible(in, p.distribution);
     p.alpha = {float(in.number("alpha", 0.1)), -1};
     if (!(p.alpha.value >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");
     p.alpha.value = std::max(p.alpha.value, kMinAlpha);

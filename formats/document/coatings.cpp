@@ -27,6 +27,11 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
         if (!(alpha >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");
         alpha = std::max(alpha, 1e-4f);
         distribution = read_distribution(builder, in);
+        if (distribution == Microfacets::phong) {
+            builder.refuse(in.where("distribution"), "microfacets of phong in a roughcoating are not supported",
+                           "beckmann is used");
+            distribution = Microfacets::beckmann;
+        }
         in.ignore({"sample_visible"});
         builder.note(in.where(),
                      "what lies below a roughcoating is as bright as below a smooth one; Mitsuba 0.6 has it darker by "

@@ -19,7 +19,8 @@
 
 namespace ambilux {
 
-enum class Microfacets : uint16_t { beckmann, ggx };
+/// Distributions of microfacet normals. Kernels without Features::phong_facets do not know the last one.
+enum class Microfacets : uint16_t { beckmann, ggx, phong };
 
 /// Parameters of a model as a scene has them, and at one point, textures looked up.
 template <class M>

@@ -490,8 +490,8 @@ TEST_CASE("mistakes are named with file and line") {
         {"<shape type='rectangle'><bsdf type='dielectric'><string name='int_ior' value='jelly'/></bsdf></shape>",
          "no index of refraction is known for 'jelly'"},
         {"<shape type='rectangle'><bsdf type='roughconductor'><string name='distribution' "
-         "value='phong'/></bsdf></shape>",
-         "microfacet distribution 'phong' is not supported"},
+         "value='blinn'/></bsdf></shape>",
+         "microfacet distribution 'blinn' is not supported"},
         {"<shape type='rectangle'><transform name='to_world'><scale x='0'/></transform></shape>",
          "the transform of the shape is singular"},
         {"<shape type='rectangle'><transform name='to_world'>\n<twist/></transform></shape>",

@@ -9,6 +9,7 @@
 #include "tests/support/mitsuba_text.h"
 #include "transport/blend.h"
 #include "transport/bsdf/coating.h"
+#include "transport/bsdf/precompute.h"
 #include "transport/resolve_bsdf.h"
 
 using namespace ambilux;
@@ -35,6 +36,44 @@ TEST_CASE("phong, ward and difftrans with their defaults") {
     CHECK(has_note(bright, "sum to more than 1"));
     const auto scaled = bright.bsdfs[bright.materials[bright.shapes[0].material].front].as<Phong>();
     CHECK(scaled.reflectance.value.x + scaled.specular_reflectance.value.x == Approx(0.99));
+}
+
+TEST_CASE("microfacets of phong: read, named, written and read again") {
+    for (const std::string name : {"phong", "as"}) {
+        const std::string facets = "<string name='distribution' value='" + name + "'/>";
+        const Scene s = load("<shape type='rectangle'><bsdf type='roughconductor'>" + facets +
+                                 "<float name='alphaU' value='0.2'/><float name='alphaV' value='0.4'/></bsdf></shape>"
+                                 "<shape type='rectangle'><bsdf type='roughdielectric'>" +
+                                 facets + "</bsdf></shape><shape type='rectangle'><bsdf type='roughplastic'>" + facets +
+                                 "<float name='alpha' value='0.3'/></bsdf></shape>",
+                             {}, "0.6.0");
+        CHECK(s.features.phong_facets);
+        const auto check_all = [](const Scene& scene) {
+            const auto record = [&](size_t shape) {
+                return scene.bsdfs[scene.materials[scene.shapes[shape].material].front];
+            };
+            const auto metal = parameters<RoughConductor>(record(0));
+            CHECK(metal.distribution == Microfacets::phong);
+            CHECK(!metal.sample_visible);
+            CHECK(metal.alpha_u.value == 0.2f);
+            CHECK(metal.alpha_v.value == 0.4f);
+            CHECK(parameters<RoughDielectric>(record(1)).distribution == Microfacets::phong);
+            const auto plastic = parameters<RoughPlastic>(record(2));
+            CHECK(plastic.distribution == Microfacets::phong);
+            CHECK(!plastic.sample_visible);
+            CHECK(plastic.fdr_internal == rough_internal_reflectance(Microfacets::phong, 0.3f, plastic.ior));
+        };
+        check_all(s);
+        const TempFolder folder;
+        const std::vector<std::string> notes = write_mitsuba(s, folder / "out.xml");
+        CHECK(std::count(notes.begin(), notes.end(), "Mitsuba 3 has no microfacet distribution 'phong'") == 1);
+        check_all(load_mitsuba(folder / "out.xml"));
+    }
+    const std::string coat =
+        "<shape type='rectangle'><bsdf type='roughcoating'><string name='distribution' value='phong'/><bsdf "
+        "type='diffuse'/></bsdf></shape>";
+    CHECK(contains(error_of(coat), "microfacets of phong in a roughcoating are not supported"));
+    CHECK(!load_quietly("<shape type='rectangle'><bsdf type='roughconductor'/></shape>").features.phong_facets);
 }
 
 TEST_CASE("blends: what they are made of, with weights; null makes a mask of it") {

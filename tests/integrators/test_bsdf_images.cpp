@@ -1,7 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
-// Images of phong, ward, difftrans, thin sheets and coatings in front of a constant environment, against integrals of
-// the published formulas over the hemisphere.
+// Images of phong, ward, difftrans, thin sheets, coatings and microfacets of phong in front of a constant environment,
+// against integrals of the published formulas over the hemisphere.
 #include <functional>
 
 #include "tests/support/closed_forms.h"
@@ -153,4 +153,23 @@ TEST_CASE("coating: a mirror's share, and the base's behind two boundaries and a
     check("<bsdf type='roughcoating'>" + layer + number("alpha", 0.002) +
               "<bsdf type='diffuse'><rgb name='reflectance' value='0.8'/></bsdf></bsdf>",
           reflected(kCosine) + albedo([&](V w) { return base / M_PI * passes(kCosine) * passes(w.z) / (ior * ior); }));
+}
+
+TEST_CASE("roughconductor of phong: powers of the cosine, shadowed as Beckmann's facets of equal alpha") {
+    const double u = 0.5, v = 0.25, nu = 2 / (u * u) - 2, nv = 2 / (v * v) - 2;
+    const auto g1 = [&](V w) {  // Walter et al. 2007, a rational fit of equation 27
+        const double a = w.z / std::hypot(w.x * u, w.y * v);
+        return a >= 1.6 ? 1 : (3.535 * a + 2.181 * a * a) / (1 + 2.276 * a + 2.577 * a * a);
+    };
+    check(
+        "<bsdf type='roughconductor'><string name='material' value='none'/><string name='distribution' "
+        "value='phong'/>" +
+            number("alphaU", u) + number("alphaV", v) + "</bsdf>",
+        albedo([&](V w) {
+            const V h = {kView.x + w.x, kView.y + w.y, kView.z + w.z};
+            const double l = std::sqrt(dot(h, h)), c = h.z / l,
+                         n = (nu * h.x * h.x + nv * h.y * h.y) / (h.x * h.x + h.y * h.y);
+            const double d = std::sqrt((nu + 2) * (nv + 2)) / (2 * M_PI) * std::pow(c, n);
+            return d * g1(kView) * g1(w) / (4 * kView.z * w.z);
+        }));
 }

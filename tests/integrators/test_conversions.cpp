@@ -62,7 +62,8 @@ struct Generator {
     }
 
     std::string roughness() {
-        const std::string both = value("string", "distribution", one_of({"ggx", "beckmann"})) + flag("sample_visible");
+        const std::string both =
+            value("string", "distribution", one_of({"ggx", "beckmann", "phong"})) + flag("sample_visible");
         return both + (coin() ? real("alpha", .1, .5) : amount("alpha_u", .1, .5) + real("alpha_v", .1, .5));
     }
     std::string index() { return real("int_ior", 1.2, 1.8) + (coin() ? real("ext_ior", 1, 1.1) : ""); }
@@ -80,7 +81,8 @@ struct Generator {
                 return "<bsdf type='plastic'>" + index() + color("diffuse_reflectance") + flag("nonlinear") + "</bsdf>";
             case 5:
                 return "<bsdf type='roughplastic'>" + index() + color("diffuse_reflectance") + real("alpha", .1, .5) +
-                       flag("nonlinear") + value("string", "distribution", one_of({"ggx", "beckmann"})) + "</bsdf>";
+                       flag("nonlinear") + value("string", "distribution", one_of({"ggx", "beckmann", "phong"})) +
+                       "</bsdf>";
             case 6:
                 return "<bsdf type='phong'>" + rgb("diffuse_reflectance", 0, .4) + real("exponent", 5, 50) + "</bsdf>";
             case 7:

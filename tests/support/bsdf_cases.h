@@ -85,6 +85,15 @@ inline Bsdf coated(Bsdf b, float ior, float alpha, Rgb absorption) {
     return b;
 }
 
+constexpr Microfacets kMicrofacets[] = {Microfacets::beckmann, Microfacets::ggx, Microfacets::phong};
+constexpr const char* kMicrofacetNames[] = {"beckmann", "ggx", "phong"};
+
+/// Distributions with the ways to sample them: visible normals, or all.
+inline std::vector<std::pair<Microfacets, bool>> sampled_microfacets() {
+    using enum Microfacets;
+    return {{beckmann, true}, {beckmann, false}, {ggx, true}, {ggx, false}, {phong, false}};
+}
+
 /// All colours 1, index 1.5.
 template <class Model>
 Resolved<Model> white() {
@@ -203,8 +212,8 @@ inline Bsdf principled_thin(float roughness, float specular, float through, bool
     return bsdf_of(p);
 }
 
-/// Every BSDF type over roughness 0.01 to 1, isotropic and not, both distributions and both ways to sample them, ior
-/// below and above 1.
+/// Every BSDF type over roughness 0.01 to 1, isotropic and not, all distributions and ways to sample them, ior below
+/// and above 1.
 inline std::vector<BsdfCase> bsdf_cases() {
     std::vector<BsdfCase> cases;
     const auto add = [&](std::string name, Bsdf b) { cases.push_back({std::move(name), b}); };
@@ -246,25 +255,23 @@ inline std::vector<BsdfCase> bsdf_cases() {
         add("plastic" + suffix, plastic(ior, false, {0.8f, 0.5f, 0.1f}));
         add("plastic nonlinear" + suffix, plastic(ior, true, {0.8f, 0.5f, 0.1f}));
     }
-    for (Microfacets m : {Microfacets::beckmann, Microfacets::ggx})
-        for (bool visible : {true, false}) {
-            const std::string suffix =
-                std::string(m == Microfacets::ggx ? " ggx" : " beckmann") + (visible ? " visible" : " all");
-            for (auto [au, av] :
-                 {std::pair{0.01f, 0.01f}, {0.1f, 0.1f}, {0.5f, 0.5f}, {1.0f, 1.0f}, {0.05f, 0.4f}, {0.6f, 0.1f}}) {
-                char alpha[32];
-                std::snprintf(alpha, sizeof alpha, " %g,%g", double(au), double(av));
-                add("rough_conductor" + suffix + alpha, rough_conductor(m, visible, au, av));
-                for (float ior : {1.5f, 0.75f})
-                    add("rough_dielectric" + suffix + alpha + " ior " + std::to_string(ior),
-                        rough_dielectric(m, visible, au, av, ior));
-            }
-            for (float alpha : {0.02f, 0.3f, 1.0f}) {
-                add("rough_plastic" + suffix + " " + std::to_string(alpha),
-                    edited<RoughPlastic>(rough_plastic(m, visible, alpha),
-                                         [&](auto& p) { p.nonlinear = alpha == 0.3f; }));
-            }
+    for (const auto& [m, visible] : sampled_microfacets()) {
+        const std::string suffix = std::string(" ") + kMicrofacetNames[uint32_t(m)] + (visible ? " visible" : " all");
+        for (auto [au, av] :
+             {std::pair{0.01f, 0.01f}, {0.1f, 0.1f}, {0.5f, 0.5f}, {1.0f, 1.0f}, {0.05f, 0.4f}, {0.6f, 0.1f}}) {
+            char alpha[32];
+            std::snprintf(alpha, sizeof alpha, " %g,%g", double(au), double(av));
+            add("rough_conductor" + suffix + alpha, rough_conductor(m, visible, au, av));
+            for (float ior : {1.5f, 0.75f})
+                add("rough_dielectric" + suffix + alpha + " ior " + std::to_string(ior),
+                    rough_dielectric(m, visible, au, av, ior));
         }
+        for (float alpha : {0.02f, 0.3f, 1.0f}) {
+            add("rough_plastic" + suffix + " " + std::to_string(alpha),
+                edited<RoughPlastic>(rough_plastic(m, visible, alpha),
+                                     [alpha](auto& p) { p.nonlinear = alpha == 0.3f; }));
+        }
+    }
     return cases;
 }
 

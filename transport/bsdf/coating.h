@@ -28,7 +28,7 @@ struct Coat {
     AMBILUX_HD bool rough() const { return at[1] > 0; }
 
     AMBILUX_HD MicrofacetDistribution microfacets() const {
-        return microfacet_distribution(distribution(), alpha(), alpha());
+        return MicrofacetDistribution::of(distribution(), alpha(), alpha());
     }
 
     /// Share of light at a cosine > 0 that the boundary lets through.

@@ -1,4 +1,4 @@
-// Microfacet distributions: Beckmann and GGX, anisotropic (Walter et al. 2007; Heitz 2014, "Understanding the
+// Microfacet distributions: Beckmann, GGX and Phong, anisotropic (Walter et al. 2007; Heitz 2014, "Understanding the
 // Masking-Shadowing Function in Microfacet-Based BRDFs"). Local frame, z = normal of the macrosurface.
 #pragma once
 
@@ -58,9 +58,16 @@ struct MicrofacetReflection {
     float value, pdf_sa, pdf_reverse_sa;
 };
 
+/// Beckmann's or GGX.
 struct MicrofacetDistribution {
     Microfacets type;
     float alpha_u, alpha_v;
+
+    /// That of a BSDF, with at least kMinAlpha.
+    AMBILUX_HD static MicrofacetDistribution of(Microfacets type, float alpha_u, float alpha_v) {
+        return {type, max(alpha_u, kMinAlpha), max(alpha_v, kMinAlpha)};
+    }
+    AMBILUX_HD MicrofacetDistribution widened(float scale) const { return {type, alpha_u * scale, alpha_v * scale}; }
 
     /// Density D(m) of microfacet area per macrosurface area and solid angle; 0 below the horizon. Relative error of 14
     /// roundings, Beckmann's 6 times its exponent more; of m there are 3 roundings over the roughness besides.
@@ -158,9 +165,52 @@ struct MicrofacetDistribution {
     }
 };
 
-/// The distribution of a BSDF, with at least kMinAlpha.
-AMBILUX_HD MicrofacetDistribution microfacet_distribution(Microfacets type, float alpha_u, float alpha_v) {
-    return {type, max(alpha_u, kMinAlpha), max(alpha_v, kMinAlpha)};
-}
+/// Phong's: a power of the cosine, with an exponent of 2/alpha² - 2 along each axis, by which its peak is Beckmann's,
+/// or 0 for an alpha above 1 (Ashikhmin and Shirley 2000; Walter et al. 2007, equations 30 to 32). It has the members
+/// of MicrofacetDistribution. Of the older Mitsuba; apart from it, since few scenes have any.
+struct PhongFacets {
+    float alpha_u, alpha_v;
+
+    AMBILUX_HD static PhongFacets of(Microfacets, float alpha_u, float alpha_v) {
+        return {max(alpha_u, kMinAlpha), max(alpha_v, kMinAlpha)};
+    }
+    AMBILUX_HD PhongFacets widened(float scale) const { return {alpha_u * scale, alpha_v * scale}; }
+
+    /// Of the cosine by its logarithm, which loses no digits where large exponents meet cosines near 1.
+    AMBILUX_HD float d(Vec3f m) const {
+        if (!(m.z > 0.0f)) return 0.0f;
+        const float u = min(alpha_u, 1.0f), v = min(alpha_v, 1.0f);
+        const float x2 = m.x * m.x, y2 = m.y * m.y, sin2 = x2 + y2, cos2 = max(m.z * m.z, 1e-30f);
+        const float exponent = x2 * (1.0f / (u * u) - 1.0f) + y2 * (1.0f / (v * v) - 1.0f);  // its half times sin²
+        const float log_cos = sin2 > 1e-30f ? log1pf(sin2 / cos2) / sin2 : 1.0f;             // the double over sin²
+        return expf(-exponent * log_cos) / (kPi * u * v);
+    }
+
+    /// Smith's term of Beckmann's distribution of equal alpha by a rational function (Walter et al. 2007, equation 27
+    /// and the text below it), as Mitsuba 0.6 has it.
+    AMBILUX_HD float sigma(Vec3f v) const {
+        const float t = sqrtf(sqr(v.x * alpha_u) + sqr(v.y * alpha_v));
+        if (!(v.z < 1.6f * t)) return v.z;
+        const float a = v.z / t;
+        return t * (1.0f + a * (2.276f + 2.577f * a)) / (3.535f + 2.181f * a);
+    }
+
+    /// Sampled from all normals, whatever `visible` says.
+    AMBILUX_HD MicrofacetReflection reflection(Vec3f wi, Vec3f wo, Vec3f m, float cosine, bool) const {
+        const float density = d(m) * 0.25f, all = density * m.z / cosine;
+        return {density / sigma(wi) * min(wo.z / sigma(wo), 1.0f), all, all};
+    }
+
+    /// An azimuth that is uniform up to a stretch, and of the cosine a power of a uniform number.
+    AMBILUX_HD Vec3f sample(Vec3f, Vec2f u, bool) const { return sample_apart(*this, u); }
+    AMBILUX_HD_APART static Vec3f sample_apart(PhongFacets of, Vec2f u) {
+        const float au = min(of.alpha_u, 1.0f), av = min(of.alpha_v, 1.0f);
+        float sine, cosine;
+        sin_cos_turns(u.y, sine, cosine);
+        const float x = au * cosine, y = av * sine, a2 = x * x + y * y;
+        const float r = sqrtf(expm1f(-a2 * logf(1.0f - u.x)) / a2);
+        return normalize({r * x, r * y, 1.0f});
+    }
+};
 
 }  // namespace ambilux

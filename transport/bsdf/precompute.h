@@ -50,8 +50,16 @@ inline double smith_g1(Microfacets type, double alpha, double cosine) {
     if (sine <= 0) return 1;
     const double a = cosine / (alpha * sine);
     if (type == Microfacets::ggx) return 2 / (1 + std::sqrt(1 + 1 / (a * a)));
+    if (type == Microfacets::phong)
+        return a >= 1.6 ? 1 : a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));  // PhongFacets::sigma
     const double lambda = a > 6 ? 0.0 : 0.5 * (std::exp(-a * a) / (a * std::sqrt(kPiD)) - std::erfc(a));
     return 1 / (1 + lambda);
+}
+
+/// Squared tangent of a normal sampled in proportion to D·cos.
+inline double squared_slope(Microfacets type, double alpha, double u) {
+    if (type == Microfacets::phong) return std::expm1(-std::min(alpha * alpha, 1.0) * std::log(u));
+    return alpha * alpha * (type == Microfacets::ggx ? (1 - u) / u : -std::log(u));
 }
 
 struct Albedo {
@@ -69,7 +77,7 @@ inline Albedo rough_dielectric_albedo(Microfacets type, double alpha, double eta
     for (size_t a = 0; a < q.node.size(); ++a) {
         // u = 1-(1-v)^2 concentrates nodes at steep normals, where 1/cos of the normal is integrably singular.
         const double rest = 1 - q.node[a], u1 = rest * rest;
-        const double tan2 = alpha * alpha * (type == Microfacets::ggx ? (1 - u1) / u1 : -std::log(u1));
+        const double tan2 = squared_slope(type, alpha, u1);
         const double cos_m = 1 / std::sqrt(1 + tan2), sin_m = std::sqrt(tan2) * cos_m;
         const double horizon = sin_i * sin_m > 0 ? -mu * cos_m / (sin_i * sin_m) : -2;
         const double phi_max = horizon <= -1 ? kPiD : std::acos(std::min(horizon, 1.0));
@@ -125,8 +133,8 @@ inline void rough_transmittance_table(Microfacets type, float alpha, float ior, 
     static const precompute::Quadrature q(80);
     for (uint32_t i = 0; i < kTransmittanceTableSize; ++i) {
         const double mu = double(i) / (kTransmittanceTableSize - 1);
-        out[i] =
-            float(precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q).transmission);
+        const auto albedo = precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q);
+        out[i] = float(std::min(albedo.transmission, 1.0));  // phong's facets gain light
     }
 }
 

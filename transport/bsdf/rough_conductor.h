@@ -9,11 +9,9 @@
 
 namespace ambilux {
 
-template <>
-struct BsdfAt<RoughConductor> : Resolved<RoughConductor> {
-    AMBILUX_HD MicrofacetDistribution microfacets() const {
-        return microfacet_distribution(distribution, alpha_u, alpha_v);
-    }
+template <class Facets>
+struct BsdfAt<RoughConductor, Facets> : Resolved<RoughConductor> {
+    AMBILUX_HD Facets microfacets() const { return Facets::of(distribution, alpha_u, alpha_v); }
 
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const { return formula_apart(*this, wi, wo); }
     AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo) const {

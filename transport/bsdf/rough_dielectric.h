@@ -9,18 +9,15 @@
 
 namespace ambilux {
 
-template <>
-struct BsdfAt<RoughDielectric> : Resolved<RoughDielectric> {
-    AMBILUX_HD MicrofacetDistribution microfacets() const {
-        return microfacet_distribution(distribution, alpha_u, alpha_v);
-    }
+template <class Facets>
+struct BsdfAt<RoughDielectric, Facets> : Resolved<RoughDielectric> {
+    AMBILUX_HD Facets microfacets() const { return Facets::of(distribution, alpha_u, alpha_v); }
 
     /// The distribution that sample() draws from: without visible normals, widened to bound the weights (section 5.3).
-    AMBILUX_HD MicrofacetDistribution sampled_microfacets(Vec3f wi) const {
+    AMBILUX_HD Facets sampled_microfacets(Vec3f wi) const {
         if (sample_visible) return microfacets();
         const float scale = 1.2f - 0.2f * sqrtf(fabsf(wi.z));
-        const MicrofacetDistribution m = microfacets();
-        return {m.type, m.alpha_u * scale, m.alpha_v * scale};
+        return microfacets().widened(scale);
     }
 
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {

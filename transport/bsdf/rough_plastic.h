@@ -8,13 +8,11 @@
 
 namespace ambilux {
 
-template <>
-struct BsdfAt<RoughPlastic> : Resolved<RoughPlastic> {
+template <class Facets>
+struct BsdfAt<RoughPlastic, Facets> : Resolved<RoughPlastic> {
     const float32* tables;  ///< SceneView::tables
 
-    AMBILUX_HD MicrofacetDistribution microfacets() const {
-        return microfacet_distribution(distribution, alpha, alpha);
-    }
+    AMBILUX_HD Facets microfacets() const { return Facets::of(distribution, alpha, alpha); }
     AMBILUX_HD float transmittance(float cosine) const {
         const float32* table = tables + transmittance_table;
         const float x = min(cosine, 1.0f) * float(kTransmittanceTableSize - 1);

@@ -5,9 +5,12 @@
 
 namespace ambilux {
 
+struct MicrofacetDistribution;
+
 /// Parameters of a model at a point and its functions: a specialisation in transport/bsdf/NAME.h for every model of the
-/// list, derived from Resolved<Model>. Smooth ones have `evaluate`, all of them `sample`.
-template <class Model>
+/// list, derived from Resolved<Model>. Smooth ones have `evaluate`, all of them `sample`. `Facets`: how normals of
+/// microfacets are distributed, of models that have a choice (transport/bsdf/microfacet.h).
+template <class Model, class Facets = MicrofacetDistribution>
 struct BsdfAt;
 
 enum class TransportMode : uint32_t { radiance, importance };

@@ -15,7 +15,7 @@ namespace ambilux {
 template <>
 struct BsdfAt<Ward> : Resolved<Ward> {
     AMBILUX_HD MicrofacetDistribution microfacets() const {
-        return microfacet_distribution(Microfacets::beckmann, alpha_u, alpha_v);
+        return MicrofacetDistribution::of(Microfacets::beckmann, alpha_u, alpha_v);
     }
 
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const { return formula_apart(*this, wi, wo); }
