@@ -51,7 +51,7 @@ inline double smith_g1(Microfacets type, double alpha, double cosine) {
     const double a = cosine / (alpha * sine);
     if (type == Microfacets::ggx) return 2 / (1 + std::sqrt(1 + 1 / (a * a)));
     if (type == Microfacets::phong)
-        return a >= 1.6 ? 1 : a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));  // PhongFacets::sigma
+        return a >= 1.6 ? 1 : std::min(a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a)), 1.0);  // PhongFacets
     const double lambda = a > 6 ? 0.0 : 0.5 * (std::exp(-a * a) / (a * std::sqrt(kPiD)) - std::erfc(a));
     return 1 / (1 + lambda);
 }
