@@ -9,8 +9,7 @@
 //   slots says so and where they are.
 #pragma once
 
-#include <bit>
-
+#include "core/math.h"
 #include "models/bsdf/model.h"
 
 namespace ambilux {
