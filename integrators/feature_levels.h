@@ -40,10 +40,11 @@ constexpr Features kMaskedFeatures = {kCommonBsdfs, kCommonEmitters, bit(Primiti
 /// All but the rarer BSDFs, emitters and sensors, blends, coatings and rules of maps.
 constexpr Features kCommonFeatures = {kCommonBsdfs, kCommonEmitters, kAllFeatures.primitives, true, true, true};
 
-/// All but instances, of which every kernel of the last level asks at every hit.
+/// All but instances, of which every kernel of the last level asks at every hit, and Phong's microfacets, which few
+/// scenes have.
 constexpr Features kFlatFeatures = [] {
     Features f = kAllFeatures;
-    f.instances = false;
+    f.instances = f.phong_facets = false;
     return f;
 }();
 

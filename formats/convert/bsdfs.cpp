@@ -165,7 +165,7 @@ xml_node add_coat(Writer& w, xml_node parent, const Coat& coat) {
     add_rgb(node, "sigma_a", coat.absorption());
     add_rgb(node, "specular_reflectance", coat.reflectance());
     if (coat.rough()) {
-        add_distribution(node, coat.distribution());
+        add_distribution(w, node, coat.distribution());
         add_number(node, "alpha", coat.alpha());
     }
     w.note("Mitsuba 3 has no BSDFs 'coating' and 'roughcoating'");
