@@ -150,7 +150,7 @@ TEST_CASE("stress has the methods that variants name, each once") {
             if (!v.outside) names.push_back(s.name);
     CHECK(names == std::vector<std::string>{"path-naive", "path-nee", "path-mis", "path-mis-power", "path-ris", "light",
                                             "light-power", "bdpt", "bdpt-power", "lvc", "lvc-power", "streaming",
-                                            "streaming-power", "megakernel", "megakernel-power"});
+                                            "streaming-power", "megakernel", "megakernel-power", "vcm"});
 }
 
 TEST_CASE("learned draws are offered to the selection as four that are worth twelve, where they may be") {
