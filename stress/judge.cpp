@@ -59,9 +59,10 @@ double events_of(const Mean& mean, double relative_rounding, double skew) {
     return std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf);
 }
 
-/// Normal equivalent of mean - answer. `skew`: skewness of the mean.
-double z_of(const Mean& mean, const Mean& answer, double relative_rounding, double skew) {
-    const double difference = mean.value - answer.value;
+/// Normal equivalent of mean - answer, less what `bias` allows. `skew`: skewness of the mean.
+double z_of(const Mean& mean, const Mean& answer, double relative_rounding, double skew, double bias) {
+    const double whole = mean.value - answer.value;
+    const double difference = std::copysign(std::max(std::abs(whole) - bias * std::abs(answer.value), 0.0), whole);
     if (!std::isfinite(difference)) return kInf;
     const double rounding = relative_rounding * std::max(std::abs(mean.value), std::abs(answer.value));
     if (std::abs(difference) <= rounding) return 0;
@@ -86,12 +87,12 @@ double relative_variance(const Mean& mean, double paths) {
     return mean.value != 0 ? mean.error * mean.error * paths / (mean.value * mean.value) : 0;
 }
 
-Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding) {
+Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding, double bias) {
     Comparison c;
     const Mean mean = mean_of(batches);
     Powers all;
     for (uint32_t k = 0; k < batches.box_count(); ++k) all.add(batch_means(batches, int(k)));
-    c.z = z_of(mean, answer, rounding, all.skewness());
+    c.z = z_of(mean, answer, rounding, all.skewness(), bias);
     c.events = events_of(mean, rounding, all.skewness());
     c.bias = answer.value != 0 ? mean.value / answer.value - 1 : 0;
     double p = 2 * normal_tail(std::abs(c.z));
@@ -104,7 +105,7 @@ Comparison compare(const Batches& batches, const Mean& answer, bool uniform, dou
             // Boxes that may have missed rare bright samples are left to the mean of all.
             if (events_of(box, rounding, own.skewness()) < kFewEvents) continue;
             if (rests_on_chance(mean, rounding) && !rests_on_chance(box, rounding)) continue;
-            const double z = z_of(box, answer, rounding, own.skewness());
+            const double z = z_of(box, answer, rounding, own.skewness(), bias);
             if (std::abs(z) > std::abs(c.box_z)) c.box_z = z;
         }
         p = 2 * std::min(p, sidak(2 * normal_tail(std::abs(c.box_z)), batches.box_count()));

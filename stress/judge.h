@@ -31,9 +31,10 @@ struct Comparison {
 /// right if it lies near the answer, and else says nothing.
 constexpr double kFewEvents = 16, kNear = 0.03;
 
-/// `uniform`: every box has the same answer. `rounding`: as of Answer. Student's t with the degrees of freedom of Welch
-/// and Satterthwaite; skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
-Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding);
+/// `uniform`: every box has the same answer. `rounding`: as of Answer. `bias`: share of the answer by which a mean may
+/// be off (Stressed::bias); what is more than that is judged. Student's t with the degrees of freedom of Welch and
+/// Satterthwaite; skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
+Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding, double bias = 0);
 
 /// What a row says of a cell.
 enum class Verdict {

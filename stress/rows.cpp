@@ -119,7 +119,7 @@ void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benig
         else
             return leave_out(row, "the benign cell, which is the answer, has no mean");
     }
-    row.comparison = compare(m.batches, row.answer, cell.answer.uniform, std::max(cell.answer.rounding, bias));
+    row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding, bias);
     row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
                          row.invalid + row.lost},
                         rows);

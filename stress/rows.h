@@ -27,7 +27,7 @@ struct Row {
 
 /// A row that nothing is known of but its answer. `benign`: of the benign cell by the same method, if there is one.
 Row blank_row(const Cell& cell, const std::string& method, const std::string& backend, const Row* benign);
-/// What was measured, judged. `rows`: of the whole sweep, for the correction.
+/// What was measured, judged. `rows`: of the whole sweep, for the correction; `bias`: Stressed::bias of the method.
 void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows, double bias = 0);
 /// Not rendered, or nothing to compare with.
 void leave_out(Row& row, const std::string& why);

@@ -260,6 +260,17 @@ TEST_CASE("an invariance is judged by the benign cell") {
     m.batches = batches(1, 0.01);
     fill_row(alone, family.cells[1], m, nullptr, 1);
     CHECK(alone.verdict == Verdict::left_out);
+    // A method that is not unbiased may be off by as much as it says, and no more.
+    m.batches = batches(1, 0.0005);
+    Cell cell = family.cells[0];
+    cell.answer = {AnswerKind::closed_form, mean_of(m.batches).value / 1.009};
+    for (const auto& [bias, verdict] :
+         {std::pair(0.0, Verdict::failed), {0.01, Verdict::ok}, {0.007, Verdict::failed}}) {
+        INFO(bias);
+        Row row = blank_row(cell, "vcm", "cpu", nullptr);
+        fill_row(row, cell, m, nullptr, 1, bias);
+        CHECK(row.verdict == verdict);
+    }
     CHECK(summary.rows[2].answer.value == Approx(6).epsilon(0.05));
 }
 
