@@ -32,6 +32,19 @@ struct MaterialOrder {
     }
 };
 
+/// The bits of a cell's number, at most 8 of them, two apart.
+AMBILUX_HD uint32_t two_apart(uint32_t cell) {
+    cell = (cell | cell << 8) & 0x0000f00fu;
+    cell = (cell | cell << 4) & 0x000c30c3u;
+    return (cell | cell << 2) & 0x00249249u;
+}
+/// Place along a Z curve of the cell that a place in units of cells lies in; cells along an axis have numbers up to
+/// `last`, below 256. What is no number lands in cell 0.
+AMBILUX_HD uint32_t z_curve(Vec3f at, float last) {
+    const auto along = [&](float x) { return two_apart(x > 0.0f ? uint32_t(min(x, last)) : 0u); };
+    return along(at.x) | along(at.y) << 1 | along(at.z) << 2;
+}
+
 /// Rays by octant of direction, then by cell of a grid of 128 cells along each axis of the scene's bounds.
 struct MortonOrder {
     static constexpr Ordering kOrdering = Ordering::morton;
@@ -44,17 +57,8 @@ struct MortonOrder {
             (ray.origin - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
         const uint32_t octant = (ray.direction.x < 0.0f ? 1u : 0u) | (ray.direction.y < 0.0f ? 2u : 0u) |
                                 (ray.direction.z < 0.0f ? 4u : 0u);
-        const uint32_t key = octant << 21 | spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2;
+        const uint32_t key = octant << 21 | z_curve(at, 127.0f);
         return key < 0xffffffu ? key : 0xfffffeu;  // the last key is that of places without a ray
-    }
-
-private:
-    /// The 7 bits of a coordinate's cell, two apart. What is no number lands in cell 0.
-    AMBILUX_HD static uint32_t spread(float x) {
-        uint32_t cell = x > 0.0f ? uint32_t(min(x, 127.0f)) : 0u;
-        cell = (cell | cell << 8) & 0x0000f00fu;
-        cell = (cell | cell << 4) & 0x000c30c3u;
-        return (cell | cell << 2) & 0x00249249u;
     }
 };
 

@@ -66,8 +66,8 @@ AMBILUX_HD_APART typename Model::Constants constants_from_slots(const SceneView&
                                                                 typename Model::Constants record, Vec2f uv) {
     static_assert(detail::InputCount<Model>::colors == 1, "inputs have room for coordinates");
     const float32* at = scene.tables + slots_at(record);
-    float numbers[kSlots<Model>];
-    for (uint32_t i = 0; i < kSlots<Model>; ++i)
+    float numbers[kSlotsOf<Model>];
+    for (uint32_t i = 0; i < kSlotsOf<Model>; ++i)
         numbers[i] = eval_float<F>(scene, {at[2 * i], __builtin_bit_cast(int32_t, at[2 * i + 1])}, uv);
     typename Model::template Slots<float> slots;
     memcpy(&slots, numbers, sizeof slots);

@@ -108,7 +108,7 @@ template <class Model>
 std::optional<typename Model::template Slots<ParamFloat>> table_slots(const Writer& w, const Textured<Model>& p) {
     if (!in_slots(p)) return {};
     typename Model::template Slots<ParamFloat> slots;
-    for (uint32_t i = 0; i < kSlots<Model>; ++i) {
+    for (uint32_t i = 0; i < kSlotsOf<Model>; ++i) {
         const float* at = w.scene.tables.data() + slots_at(p) + 2 * i;
         slot_array<ParamFloat>(slots)[i] = {at[0], std::bit_cast<int32_t>(at[1])};
     }

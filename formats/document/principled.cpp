@@ -71,11 +71,11 @@ void read_common(Builder& builder, Reader& in, Textured<Model>& p, SlotsOf<Model
 template <class Model>
 void set_slots(Builder& builder, Textured<Model>& p, SlotsOf<Model> slots) {
     const ParamFloat* given = slot_array<ParamFloat>(slots);
-    const std::span all(given, kSlots<Model>);
+    const std::span all(given, kSlotsOf<Model>);
     typename Model::Constants& constants = p;
     if (std::all_of(all.begin(), all.end(), is_constant)) {
         typename Model::template Slots<float> numbers;
-        for (uint32_t i = 0; i < kSlots<Model>; ++i) slot_array<float>(numbers)[i] = given[i].value;
+        for (uint32_t i = 0; i < kSlotsOf<Model>; ++i) slot_array<float>(numbers)[i] = given[i].value;
         constants = Model::with_slots(constants, numbers);
     } else if (!builder.validate_only) {
         set_slots_at(constants, uint32_t(builder.scene.tables.size()));

@@ -18,7 +18,7 @@ template <class Model>
 concept HasSlots = requires { typename Model::template Slots<float>; };
 
 template <class Model>
-constexpr uint32_t kSlots = sizeof(typename Model::template Slots<float>) / sizeof(float);
+constexpr uint32_t kSlotsOf = sizeof(typename Model::template Slots<float>) / sizeof(float);
 
 /// Share of `of_one` in 1/65535.
 AMBILUX_HD uint16_t share_of_65535(float of_one) { return uint16_t(clamp(of_one, 0.0f, 1.0f) * 65535.0f + 0.5f); }

@@ -19,7 +19,7 @@ namespace {
 using Learning = MarkIntegrator<kDiffuseFeatures, CwbvhTracer, true, true>;
 using Numbered = MarkIntegrator<kDiffuseFeatures, CwbvhTracer, false, false>;
 
-constexpr uint32_t kWaveSlots = 9 * 5 * kTilePixels;
+constexpr uint32_t kSlots = 9 * 5 * kTilePixels;
 const Scene& scene() {
     static const Scene s = project_scene("cornell", 70, 38);
     return s;
@@ -92,9 +92,9 @@ TEST_CASE("a wave on a device that has no room among what all append is done aga
             RenderSettings s = mark_settings(own);
             s.wave_size = kTilePixels;
             const RenderStats stats = check_film<Numbered>(s, 3);
-            CHECK(items(stats, "leave_marks") == 3 * kWaveSlots + kTilePixels);
+            CHECK(items(stats, "leave_marks") == 3 * kSlots + kTilePixels);
             CHECK(items(stats, "append_marks") == n.all + other.all + mark_counts(70, 38, s, 2).all);
-            CHECK(items(stats, "gather_marks") == 3 * kWaveSlots);
+            CHECK(items(stats, "gather_marks") == 3 * kSlots);
             CHECK(queue(stats, "marks").capacity > n.all);
             CHECK(queue(stats, "marks").peak == n.all);
             s.wave_size = 0;
@@ -107,11 +107,11 @@ TEST_CASE("a budget of a device divides the film into waves that have the same b
     for (const char* room : {"20000", "30000"}) {
         RenderSettings s = mark_settings({{"room", room}, {"iteration_samples", "2"}});
         s.memory = make<Learning>(s)->stats().memory_bytes_predicted + (1 << 20);  // and an image
-        CHECK(check_film<Learning>(s, 4).wave_paths == 2 * kWaveSlots);
+        CHECK(check_film<Learning>(s, 4).wave_paths == 2 * kSlots);
         // Most of a wave are queues of marks, kMostMarks of a slot.
-        s.memory -= kWaveSlots * kMostMarks * sizeof(Mark);
+        s.memory -= kSlots * kMostMarks * sizeof(Mark);
         const RenderStats divided = check_film<Learning>(s, 4);
-        CHECK(divided.wave_paths < 2 * kWaveSlots);
+        CHECK(divided.wave_paths < 2 * kSlots);
         CHECK(divided.memory_bytes_peak <= s.memory);
         CHECK(items(divided, "splat") == 4 * 70 * 38);
     }

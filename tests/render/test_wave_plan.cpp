@@ -426,7 +426,7 @@ namespace {
 
 /// Slots of the queues that have any.
 using Rooms = std::map<std::string, uint32_t>;
-constexpr uint32_t kWaveSlots = 512, kStreams = 128, kKept = 700;  ///< of a wave; in flight; light vertices
+constexpr uint32_t kSlots = 512, kStreams = 128, kKept = 700;  ///< of a wave; in flight; light vertices
 
 template <template <Features, class, Fusion> class Of, Fusion K>
 Rooms rooms_of(const char* integrator, const char* variant,
@@ -441,7 +441,7 @@ Rooms rooms_of(const char* integrator, const char* variant,
     typename Integrator::Policy p = Integrator::plan(scene, s);
     p.waves.slots_in_flight = kStreams;
     Layout dry;
-    Integrator::lay_out(dry, p, WaveSize{kWaveSlots, kKept, {}});
+    Integrator::lay_out(dry, p, WaveSize{kSlots, kKept, {}});
     Rooms rooms;
     for (size_t q = 0; q < dry.queue_names().size(); ++q)
         if (const uint32_t capacity = dry.queue_capacities()[q]; capacity > 0) rooms[dry.queue_names()[q]] = capacity;
@@ -457,13 +457,13 @@ Rooms rooms(uint32_t slots, const std::vector<std::string>& names, Rooms others 
 }  // namespace
 
 TEST_CASE("queues have room for what their strategies can fill, and none where nothing fills them") {
-    constexpr uint32_t kSplats = kKept + kWaveSlots;  // at every vertex, and of the emitter itself
-    const Rooms pairs = rooms(kWaveSlots, {"eye_vertices", "pairs", "deferred"}, {{"light_vertices", kKept}}),
-                hits = rooms(kWaveSlots, {"hits", "rays"}),
-                emission = rooms(kWaveSlots, {"emission", "emission_contributions"}, hits),
-                shadows = rooms(kWaveSlots, {"vertices", "candidates", "shadows", "shadow_contributions"}, hits),
-                splats = rooms(kWaveSlots, {"camera_vertices", "splat_candidates", "weighted_splats"},
-                               {{"splats", kSplats}});
+    constexpr uint32_t kSplats = kKept + kSlots;  // at every vertex, and of the emitter itself
+    const Rooms pairs = rooms(kSlots, {"eye_vertices", "pairs", "deferred"}, {{"light_vertices", kKept}}),
+                hits = rooms(kSlots, {"hits", "rays"}),
+                emission = rooms(kSlots, {"emission", "emission_contributions"}, hits),
+                shadows = rooms(kSlots, {"vertices", "candidates", "shadows", "shadow_contributions"}, hits),
+                splats =
+                    rooms(kSlots, {"camera_vertices", "splat_candidates", "weighted_splats"}, {{"splats", kSplats}});
     const auto together = [](Rooms all, const std::vector<Rooms>& others) {
         for (const Rooms& other : others) all.insert(other.begin(), other.end());
         return all;
@@ -478,8 +478,8 @@ TEST_CASE("queues have room for what their strategies can fill, and none where n
     CHECK(staged("strategies", "connections") == together(shadows, {pairs}));
     CHECK(staged("strategies", "light") == together(hits, {splats}));
     CHECK(rooms_of<LightIntegrator, kNoFusion>("light", "wavefront", {{"light_paths", "2"}}) ==
-          together(rooms(kKept + 2 * kWaveSlots, {"splats"}, hits), {splats}));
-    const Rooms fused = rooms(kWaveSlots, {"shadows", "weighted_splats"}, {{"splats", kSplats}});
+          together(rooms(kKept + 2 * kSlots, {"splats"}, hits), {splats}));
+    const Rooms fused = rooms(kSlots, {"shadows", "weighted_splats"}, {{"splats", kSplats}});
     CHECK(rooms_of<WavefrontIntegrator, kDeviceFusion>("bdpt", "wavefront") == together(hits, {fused, pairs}));
     CHECK(rooms_of<WavefrontIntegrator, kHostFusion>("bdpt", "wavefront") ==
           together(hits, {fused, {{"light_vertices", kKept}}}));
@@ -487,7 +487,7 @@ TEST_CASE("queues have room for what their strategies can fill, and none where n
 
     CHECK(rooms_of<PathTracer, kNoFusion>("path", "wavefront") == together(emission, {shadows}));
     CHECK(rooms_of<PathTracer, kNoFusion>("path", "wavefront", {{"estimator", "naive"}}) == emission);
-    CHECK(rooms_of<PathTracer, kDeviceFusion>("path", "wavefront") == rooms(kWaveSlots, {"shadows"}, hits));
+    CHECK(rooms_of<PathTracer, kDeviceFusion>("path", "wavefront") == rooms(kSlots, {"shadows"}, hits));
     CHECK(rooms_of<PathTracer, kDeviceFusion>("path", "wavefront", {{"estimator", "naive"}}) == hits);
 
     const std::vector<std::pair<const char*, const char*>> only_hits = {{"strategies", "hits"}};
@@ -514,12 +514,12 @@ TEST_CASE(
         WavePolicy waves;
         waves.strategy_depth = strategy_depth;
         Layout dry;
-        EyeQueues<UnidirectionalMis>::lay_out<kHostFusion, kFeatures>(dry, kWaveSlots, paths, {}, waves);
+        EyeQueues<UnidirectionalMis>::lay_out<kHostFusion, kFeatures>(dry, kSlots, paths, {}, waves);
         return dry.bytes();
     };
-    CHECK(bytes(0, kWaveSlots) == bytes(0, 0));
-    CHECK(bytes(1, kWaveSlots) == bytes(0, 0) + kWaveSlots * sizeof(Lane));
-    CHECK(bytes(3, 2 * kWaveSlots) == bytes(0, 0) + 2 * kWaveSlots * sizeof(Lane));
+    CHECK(bytes(0, kSlots) == bytes(0, 0));
+    CHECK(bytes(1, kSlots) == bytes(0, 0) + kSlots * sizeof(Lane));
+    CHECK(bytes(3, 2 * kSlots) == bytes(0, 0) + 2 * kSlots * sizeof(Lane));
 }
 
 namespace {

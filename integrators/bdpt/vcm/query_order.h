@@ -2,10 +2,9 @@
 #pragma once
 
 #include "integrators/bdpt/vcm/merging_mis.h"
-#include "items/subpath_items.h"
 #include "queues/primitives.h"
-#include "queues/queue.h"
 #include "queues/stage_record.h"
+#include "stages/order_keys.h"
 
 namespace ambilux {
 
@@ -22,17 +21,7 @@ struct QueryOrder {
     /// Along a Z curve through the scene's bounds.
     AMBILUX_HD static uint32_t key(const SceneView& scene, Vec3f p) {
         constexpr float kHalf = 1u << (kAxisBits - 1);
-        const Vec3f c = (p - scene.bounds_center) * (kHalf / scene.bounds_radius) + splat(kHalf);
-        return spread(c.x) | spread(c.y) << 1 | spread(c.z) << 2;
-    }
-
-private:
-    /// The bits of a coordinate's cell, two apart.
-    AMBILUX_HD static uint32_t spread(float x) {
-        uint32_t cell = uint32_t(min(max(x, 0.0f), float((1u << kAxisBits) - 1)));
-        cell = (cell | cell << 8) & 0x0000f00fu;
-        cell = (cell | cell << 4) & 0x000c30c3u;
-        return (cell | cell << 2) & 0x00249249u;
+        return z_curve((p - scene.bounds_center) * (kHalf / scene.bounds_radius) + splat(kHalf), 2.0f * kHalf - 1.0f);
     }
 };
 
