@@ -77,6 +77,6 @@ def selections(data):
 def strategies(data):
     """A row per scene, run and strategy (s,t): variance of a sample, its interval, its share of all, the share of its greatest pixel."""
     data = loaded(data)
-    rows = [(scene, run, s, t, e.value, e.low, e.high, share, seeds, pixel) for scene in data.scenes for run in data.runs
-            for s, t, e, share, seeds, pixel in pyramid.variances(data, scene, run)]
-    return pandas.DataFrame(rows, columns=["scene", "run", "s", "t", "variance", "variance_low", "variance_high", "share", "seeds", "largest_pixel"])
+    rows = [(scene, run, *strategy, e.value, e.low, e.high, share, seeds, pixel) for scene in data.scenes for run in data.runs
+            for strategy, e, share, seeds, pixel in pyramid.variances(data, scene, run)]
+    return pandas.DataFrame(rows, columns=["scene", "run", "s", "t", "merge", "variance", "variance_low", "variance_high", "share", "seeds", "largest_pixel"])

@@ -194,12 +194,12 @@ def to_csv(lines):
 
 
 def variances_to_csv(rows):
-    """`rows`: (scene, run, s, t, Estimate, share, seeds, share of its greatest pixel)."""
+    """`rows`: (scene, run, Strategy, Estimate, share, seeds, share of its greatest pixel)."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["scene", "run", "s", "t", "variance", "variance_error", "variance_low", "variance_high", "share", "seeds", "largest_pixel"])
-    for scene, run, s, t, e, share, seeds, pixel in rows:
-        writer.writerow([scene, run, s, t, *(f"{v:.9g}" for v in (e.value, e.error, e.low, e.high, share)), seeds, f"{pixel:.9g}"])
+    writer.writerow(["scene", "run", "s", "t", "merge", "variance", "variance_error", "variance_low", "variance_high", "share", "seeds", "largest_pixel"])
+    for scene, run, strategy, e, share, seeds, pixel in rows:
+        writer.writerow([scene, run, strategy.s, strategy.t, int(strategy.merge), *(f"{v:.9g}" for v in (e.value, e.error, e.low, e.high, share)), seeds, f"{pixel:.9g}"])
     return out.getvalue()
 
 

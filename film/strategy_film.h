@@ -18,6 +18,10 @@ struct StrategyFilm {
     Lane* raw = nullptr;          ///< per slot: the unweighted value in flight and its strategy
     uint32_t max_depth = 0;
 
+    /// Those of merges come after the others.
+    static constexpr uint32_t images(uint32_t max_depth, bool merges) {
+        return strategy_count(max_depth) + (merges ? merge_count(max_depth) : 0);
+    }
     /// Notes what a slot's candidate is worth without its weight; a slot has one candidate at a time.
     AMBILUX_HD void remember(uint32_t slot, Rgb value, Strategy strategy) const {
         if (!sums) return;
@@ -33,9 +37,17 @@ struct StrategyFilm {
         if (sums) add({raw[slot].word[3]}, pixels, pixel, start_of<Rgb>(raw[slot]), weighted);
     }
     AMBILUX_HD void add(Strategy strategy, uint32_t pixels, uint32_t pixel, Rgb value, Rgb weighted) const {
-        if (!sums || strategy.segments() > max_depth) return;
+        if (sums && strategy.segments() <= max_depth) add_to(strategy_index(strategy), pixels, pixel, value, weighted);
+    }
+    /// A merge (merge_index).
+    AMBILUX_HD void add_merge(uint32_t s, uint32_t t, uint32_t pixels, uint32_t pixel, Rgb value, Rgb weighted) const {
+        if (sums && s + t - 2 <= max_depth)
+            add_to(strategy_count(max_depth) + merge_index(s, t), pixels, pixel, value, weighted);
+    }
+
+private:
+    AMBILUX_HD void add_to(uint32_t index, uint32_t pixels, uint32_t pixel, Rgb value, Rgb weighted) const {
         const uint64_t image = uint64_t(pixels) * 3;
-        const uint32_t index = strategy_index(strategy);
         if (!is_finite(value) || !is_finite(weighted)) {
             fetch_add_shared(reinterpret_cast<int64_t*>(dropped + index), 1);  // tasks of the host share these counters
             return;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "film/strategy_film.h"
 #include "integrators/kept_state.h"
 #include "integrators/settings.h"
 #include "queues/order.h"
@@ -25,6 +26,7 @@ struct WavePolicy {
     uint32_t multi_bounce_below = 0;  ///< on a device: fewer subpaths than this take several bounces in one launch
     float cull = 0;                   ///< cull_factor; 0: none
     uint32_t strategy_depth = 0;      ///< segments up to which images of single strategies are gathered; 0: none
+    bool strategy_merges = false;     ///< merges are among them
     bool deterministic = false;
     uint32_t slots_in_flight = 0;          ///< that take one path of a wave after the other, as many as the renderer
                                            ///< finds right; 0: every path has a slot of its own
@@ -33,6 +35,7 @@ struct WavePolicy {
     uint32_t iteration_samples = 1;        ///< of every pixel in one iteration
     bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
 
+    uint32_t strategy_images() const { return StrategyFilm::images(strategy_depth, strategy_merges); }
     /// Most light subpaths of a slot.
     uint32_t light_rounds() const { return (light_subpaths_per_tile + kTilePixels - 1) / kTilePixels; }
     /// Light subpaths of `slots`, a multiple of kTilePixels, if all of them are active.

@@ -81,7 +81,8 @@ struct RenderStats {
 /// What one strategy found, mean over the samples rendered so far: width x height x 3 values, row-major from the top
 /// left.
 struct StrategyImage {
-    uint32_t s, t;
+    uint32_t s, t;                     ///< vertices of the light and of the eye subpath
+    bool merge;                        ///< they merge at a vertex that both count
     std::vector<float> raw, weighted;  ///< without and with the weight of multiple importance sampling
     uint64_t dropped;                  ///< values left out as not finite
 };

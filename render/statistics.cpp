@@ -68,22 +68,22 @@ void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter
 std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<double>& sums,
                                            const std::vector<uint64_t>& dropped) {
     std::vector<StrategyImage> images;
-    if (max_depth == 0) return images;
-    const size_t values = sums.size() / 2 / strategy_count(max_depth);
     const double scale = samples ? 1.0 / double(samples) : 0.0;
-    for (uint32_t k = 1; k <= max_depth; ++k) {
-        for (uint32_t s = 0; s <= k; ++s) {
-            const uint32_t index = strategy_index(Strategy::make(s, k + 1 - s));
-            StrategyImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values),
-                                   dropped[index]};
-            const double* raw = sums.data() + 2 * index * values;
-            for (size_t i = 0; i < values; ++i) {
-                image.raw[i] = float(raw[i] * scale);
-                image.weighted[i] = float(raw[values + i] * scale);
-            }
-            images.push_back(std::move(image));
+    const auto add = [&](uint32_t s, uint32_t t, bool merge) {
+        const size_t index = images.size(), values = sums.size() / 2 / dropped.size();
+        StrategyImage image = {s, t, merge, std::vector<float>(values), std::vector<float>(values), dropped[index]};
+        const double* raw = sums.data() + 2 * index * values;
+        for (size_t i = 0; i < values; ++i) {
+            image.raw[i] = float(raw[i] * scale);
+            image.weighted[i] = float(raw[values + i] * scale);
         }
-    }
+        images.push_back(std::move(image));
+    };
+    for (uint32_t k = 1; k <= max_depth; ++k)
+        for (uint32_t s = 0; s <= k; ++s) add(s, k + 1 - s, false);
+    if (dropped.size() > images.size())
+        for (uint32_t k = 2; k <= max_depth; ++k)
+            for (uint32_t s = 2; s <= k; ++s) add(s, k + 2 - s, true);
     return images;
 }
 

@@ -22,11 +22,9 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
 /// Fills the queues: the largest peak and all losses over `sets` sets of counters.
 void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter*>& sets, RenderStats& stats);
 
-/// Sums of StrategyFilm for a film of `pixels`.
-inline uint64_t strategy_values(uint32_t max_depth, uint64_t pixels) {
-    return uint64_t(strategy_count(max_depth)) * 2 * pixels * 3;
-}
-/// Means of what they gathered.
+/// Sums of StrategyFilm for `images` of `pixels`.
+inline uint64_t strategy_values(uint32_t images, uint64_t pixels) { return uint64_t(images) * 2 * pixels * 3; }
+/// Means of what they gathered. As many of `dropped` as images.
 std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<double>& sums,
                                            const std::vector<uint64_t>& dropped);
 

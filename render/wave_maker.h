@@ -92,9 +92,9 @@ struct WaveMaker {
         f.samples = layout.allocate<Lane>(kFilmWide ? plan.film_wave.slot_count() : 0);
         if (cells && doubles) f.splats.doubles = layout.allocate<double>(cells * 3);
         if (cells && !doubles) f.splats.floats = layout.allocate<Lane>(cells);
-        if (const uint32_t depth = policy.waves.strategy_depth) {
-            f.strategies = layout.allocate<double>(strategy_values(depth, pixels));
-            f.strategies_dropped = layout.allocate<uint64_t>(strategy_count(depth));
+        if (const uint32_t images = policy.waves.strategy_images()) {
+            f.strategies = layout.allocate<double>(strategy_values(images, pixels));
+            f.strategies_dropped = layout.allocate<uint64_t>(images);
         }
         return f;
     }

@@ -120,11 +120,10 @@ public:
     }
 
     std::vector<StrategyImage> strategy_images() override {
-        const uint32_t depth = maker_.policy.waves.strategy_depth;
-        if (depth == 0) return {};
-        return ambilux::strategy_images(depth, samples_,
-                                        read(film_.strategies, strategy_values(depth, maker_.film_values() / 3)),
-                                        read(film_.strategies_dropped, strategy_count(depth)));
+        const uint32_t images = maker_.policy.waves.strategy_images();
+        return ambilux::strategy_images(maker_.policy.waves.strategy_depth, samples_,
+                                        read(film_.strategies, strategy_values(images, maker_.film_values() / 3)),
+                                        read(film_.strategies_dropped, images));
     }
 
     uint32_t preferred_batch() const override {

@@ -24,12 +24,14 @@ void write_technique_images(const std::string& folder, const Scene& scene, const
     nlohmann::json entries = nlohmann::json::array();
     uint32_t max_depth = 0;
     for (const StrategyImage& image : images) {
-        max_depth = std::max(max_depth, image.s + image.t - 1);
+        max_depth = std::max(max_depth, image.s + image.t - (image.merge ? 2 : 1));
         Attributes attributes = image_attributes(scene, settings, stats);
         attributes["s"] = image.s;
         attributes["t"] = image.t;
+        if (image.merge) attributes["merge"] = 1;
         const auto write = [&](const char* kind, const std::vector<float>& rgb) {
-            const std::string name = fmt::format("{}_s{:02}_t{:02}.exr", kind, image.s, image.t);
+            const std::string name =
+                fmt::format("{}_{}s{:02}_t{:02}.exr", kind, image.merge ? "merge_" : "", image.s, image.t);
             attributes["technique"] = kind;
             write_exr(folder + "/" + name, {width, height, rgb}, attributes);
             return name;
@@ -37,6 +39,7 @@ void write_technique_images(const std::string& folder, const Scene& scene, const
         const std::string raw = write("raw", image.raw), weighted = write("weighted", image.weighted);
         entries.push_back({{"s", image.s},
                            {"t", image.t},
+                           {"merge", image.merge},
                            {"raw", raw},
                            {"weighted", weighted},
                            {"mean_raw", mean_of(image.raw)},

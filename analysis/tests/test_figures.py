@@ -197,7 +197,7 @@ def test_pyramid_has_rows_by_length_and_columns_by_light_vertices(folder):
 
 
 def test_exposure_of_raw_rows_undoes_their_scale():
-    rows = {(0, 2): synthetic.picture(), (0, 3): synthetic.picture() / 8}
+    rows = {pyramid.Strategy(0, 2): synthetic.picture(), pyramid.Strategy(0, 3): synthetic.picture() / 8}
     figure, factors = pyramid.draw(rows, "raw")
     assert factors[2] / factors[1] == pytest.approx(8)
     _, stops = pyramid.draw(rows, "weighted")
@@ -206,10 +206,10 @@ def test_exposure_of_raw_rows_undoes_their_scale():
 
 
 def test_variance_of_strategies_is_that_of_their_noise(folder):
-    rows = {(s, t): e for s, t, e, _, n, _ in pyramid.variances(experiment.load(folder), "box", "lvc[connections=1]") if n == 3}
+    rows = {strategy: e for strategy, e, _, n, _ in pyramid.variances(experiment.load(folder), "box", "lvc[connections=1]") if n == 3}
     assert len(rows) == 8
-    for (s, _), e in rows.items():
-        assert e.value == pytest.approx((0.2 * (s + 1)) ** 2, rel=4 * np.sqrt(2 / (2 * 48 * 36 * 3)))
+    for strategy, e in rows.items():
+        assert e.value == pytest.approx((0.2 * (strategy.s + 1)) ** 2, rel=4 * np.sqrt(2 / (2 * 48 * 36 * 3)))
 
 
 @pytest.mark.parametrize("change,message", [
@@ -237,11 +237,24 @@ def test_a_lamp_in_view_does_not_set_the_exposure_of_weighted_rows():
 
 def test_weighted_strategies_tell_their_share_of_the_light():
     picture = synthetic.picture()
-    figure, _ = pyramid.draw({(0, 2): 3 * picture, (1, 1): picture, (0, 3): 0 * picture, (1, 2): 1e-4 * picture, (2, 1): 0.2 * picture}, "weighted")
+    shares = {(0, 2): 3, (1, 1): 1, (0, 3): 0, (1, 2): 1e-4, (2, 1): 0.2}
+    figure, _ = pyramid.draw({pyramid.Strategy(*st): share * picture for st, share in shares.items()}, "weighted")
     titles = [a.get_title() for a in figure.axes if a.get_title()]
     assert titles == ["(0,2) 71 %", "(1,1) 24 %", "(0,3) 0", "(1,2) <0.1 %", "(2,1) 4.8 %"]
-    figure, _ = pyramid.draw({(0, 2): picture, (1, 1): picture}, "raw")
+    figure, _ = pyramid.draw({pyramid.Strategy(0, 2): picture, pyramid.Strategy(1, 1): picture}, "raw")
     assert [a.get_title() for a in figure.axes] == ["(0,2)", "(1,1)"]
+
+
+def test_merges_stand_to_the_right_in_the_row_of_their_length(tmp_path):
+    synthetic.add_techniques(tmp_path, "box", "vcm", (1,), max_depth=2)
+    place = tmp_path / "techniques" / "box" / "vcm_1"
+    data = json.loads((place / "techniques.json").read_text())
+    data["entries"].append({**data["entries"][-1], "s": 2, "t": 2, "merge": True})
+    (place / "techniques.json").write_text(json.dumps(data))
+    entries = pyramid.read(place).entries
+    figure, _ = pyramid.draw({strategy: synthetic.picture() for strategy in entries}, "raw")
+    assert [a.get_title() for a in figure.axes] == ["(0,2)", "(1,1)", "", "", "(0,3)", "(1,2)", "(2,1)", "(2,2) merged"]
+    style.plt.close("all")
 
 
 def test_flip_is_zero_for_equal_images_and_grows_with_the_error():

@@ -161,6 +161,25 @@ def test_verdicts_say_what_the_data_say(tmp_path):
     assert len(marked) == 1 and "& mis" in marked[0]
 
 
+def test_a_bias_that_the_method_states_is_told_and_takes_no_slope_for_a_fault(tmp_path):
+    folder = synthetic.make(tmp_path / "r", scenes=("box",), seeds=(1, 2, 3, 4), spread=0.03)
+
+    def change(line):
+        cells = line.split(",")
+        if cells[1] in ("nee", "mis"):  # error^2 = variance / n + bias^2
+            cells[10] = cells[11] = f"{math.hypot(float(cells[11]), 0.2):.9g}"
+        return ",".join([*cells, "biased by a radius" if cells[1] == "mis" else ""])
+
+    data = experiment.load(edit(folder, tmp_path / "stated", lambda rows: [rows[0] + ",stated_bias", *map(change, rows[1:])]))
+    lines = summary.lines(data)
+    assert {line.run: line.stated_bias for line in lines} == {"naive": "", "nee": "", "mis": "biased by a radius"}
+    found = remarks.remarks(data, lines)
+    assert any("box, mis: biased by a radius, so that errors hold this bias" in r for r in found)
+    assert any("box, nee: the error falls with slope" in r for r in found)
+    assert not any("box, mis: the error falls with slope" in r for r in found)
+    assert verdicts.verdicts(lines)["box", "mis"][1].endswith("by its method biased by a radius")
+
+
 def test_slopes_leave_out_what_the_noise_of_the_reference_hides(tmp_path):
     data = experiment.load(synthetic.make(tmp_path / "r", scenes=("box",), reference_noise=0.3))
     assert summary.resolved(data, "box", "naive") == [0, 1, 2]  # 2, 1, 0.5, but not 0.25

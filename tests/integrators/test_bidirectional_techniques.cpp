@@ -39,6 +39,10 @@ TEST_CASE("Images of strategies are numbered without gaps") {
     for (uint32_t k = 1; k <= kMaxStrategyDepth; ++k)
         for (uint32_t s = 0; s <= k; ++s) CHECK(strategy_index(Strategy::make(s, k + 1 - s)) == next++);
     CHECK(strategy_count(kMaxStrategyDepth) == next);
+    next = 0;
+    for (uint32_t k = 2; k <= kMaxStrategyDepth; ++k)
+        for (uint32_t s = 2; s <= k; ++s) CHECK(merge_index(s, k + 2 - s) == next++);
+    CHECK(merge_count(kMaxStrategyDepth) == next);
 }
 
 TEST_CASE("Images of single strategies change no bit of the image, and their weighted ones add up to it",
@@ -73,6 +77,48 @@ TEST_CASE("Images of single strategies change no bit of the image, and their wei
             for (const StrategyImage& image : with.images) CHECK(image.dropped == 0);
         }
     }
+}
+
+TEST_CASE(
+    "Images of merges: no bit of the image changes, weighted ones add up to it, raw ones to those of other strategies",
+    "[bidirectional]") {
+    for (auto [name, depth] : {std::pair{"cornell", 4}, {"glass", 5}}) {
+        Scene scene = project_scene(name, 24, 16);
+        scene.integrator.max_depth = depth;
+        for (const char* integrator : {"vcm", "bpm", "sppm"}) {
+            INFO(name << ", " << integrator);
+            RenderSettings settings = method_settings(scene, kAll, 5);
+            settings.integrator = integrator;
+            const Gathered with = gather(scene, settings, uint32_t(depth), 16);
+            CHECK(render_scene(scene, settings, 16).film.sum == with.film.sum);
+            REQUIRE(with.images.size() == StrategyFilm::images(uint32_t(depth), true));
+            size_t differ = 0;
+            for (size_t i = 0; i < with.film.sum.size(); ++i) {
+                double total = 0;
+                for (const StrategyImage& image : with.images) total += image.weighted[i];
+                differ += !close(total, with.film.mean(i));
+            }
+            CHECK(differ == 0);
+        }
+    }
+    // Paths of two segments by a merge, and by next event estimation.
+    Scene scene = project_scene("cornell", 24, 16);
+    scene.integrator.max_depth = 2;
+    RenderSettings settings = method_settings(scene, kAll, 5);
+    settings.integrator = "vcm";
+    apply_setting(settings, "merge_radius", "0.01");
+    apply_setting(settings, "merge_alpha", "1");
+    apply_setting(settings, "light_paths", "16");
+    const auto mean = [](const StrategyImage& image) {
+        double sum = 0;
+        for (const float v : image.raw) sum += double(v);
+        return sum / double(image.raw.size());
+    };
+    const std::vector<StrategyImage> images = gather(scene, settings, 2, 256).images;
+    const StrategyImage &next_event = images[strategy_index(Strategy::make(1, 2))], &merge = images.back();
+    REQUIRE(merge.merge);
+    CHECK((merge.s == 2 && merge.t == 2));
+    CHECK(std::abs(mean(merge) / mean(next_event) - 1) < 0.04);  // a hundredth of chance, and edges
 }
 
 TEST_CASE("A single strategy as a mask is its raw image", "[bidirectional]") {

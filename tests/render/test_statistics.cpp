@@ -3,6 +3,7 @@
 // From the records of stages to the statistics of a render.
 #include <algorithm>
 
+#include "film/strategy_film.h"
 #include "queues/layout.h"
 #include "render/fused_shares.h"
 #include "render/statistics.h"
@@ -124,12 +125,13 @@ TEST_CASE("Queues are as full as in the fullest wave, and lose what all waves lo
 }
 
 TEST_CASE("Images of single strategies are means, raw and weighted, from the shortest paths on") {
-    constexpr uint32_t kDepth = 2, kValues = 300, kStrategies = 5;
-    REQUIRE(strategy_values(kDepth, 100) == 2 * kValues * kStrategies);
+    constexpr uint32_t kDepth = 2, kValues = 300, kStrategies = 6;
+    REQUIRE(StrategyFilm::images(kDepth, true) == kStrategies);
+    REQUIRE(strategy_values(kStrategies, 100) == 2 * kValues * kStrategies);
     std::vector<double> sums(2 * kValues * kStrategies);
     for (size_t i = 0; i < sums.size(); ++i) sums[i] = 100 + double(i);
-    const std::vector<uint64_t> dropped = {7, 0, 5, 6, 8};
-    const std::pair<uint32_t, uint32_t> names[kStrategies] = {{0, 2}, {1, 1}, {0, 3}, {1, 2}, {2, 1}};
+    const std::vector<uint64_t> dropped = {7, 0, 5, 6, 8, 9};
+    const std::pair<uint32_t, uint32_t> names[kStrategies] = {{0, 2}, {1, 1}, {0, 3}, {1, 2}, {2, 1}, {2, 2}};
     for (const uint64_t samples : {4, 0}) {
         const std::vector<StrategyImage> images = strategy_images(kDepth, samples, sums, dropped);
         REQUIRE(images.size() == kStrategies);
@@ -137,6 +139,7 @@ TEST_CASE("Images of single strategies are means, raw and weighted, from the sho
             CAPTURE(k);
             CHECK(images[k].s == names[k].first);
             CHECK(images[k].t == names[k].second);
+            CHECK(images[k].merge == (k == 5));
             CHECK(images[k].dropped == dropped[k]);
             REQUIRE(images[k].raw.size() == kValues);
             REQUIRE(images[k].weighted.size() == kValues);

@@ -369,24 +369,27 @@ TEST_CASE("images of strategies are listed with their means, and the longest pat
     RenderStats stats = some_stats();
     stats.selection = {};
     const std::vector<float> raw = {1, 2, 3, 4, 5, 6}, weighted = {0, 1, 0, 1, 0, 1};
-    write_technique_images(
-        folder / "t", small_scene(2, 1), stats.settings, stats,
-        {{1, 2, raw, weighted, 3}, {3, 2, weighted, raw, 0}, {0, 2, weighted, {0, 0, 0, 0, 0, 0}, 1}});
+    write_technique_images(folder / "t", small_scene(2, 1), stats.settings, stats,
+                           {{1, 2, false, raw, weighted, 3},
+                            {3, 4, true, weighted, raw, 0},
+                            {0, 2, false, weighted, {0, 0, 0, 0, 0, 0}, 1}});
     const json list = json::parse(read_file(folder / "t/techniques.json"));
     CHECK(list == json::parse(R"({"scene": "room.xml", "integrator": "bdpt", "variant": "learned", "spp": 64,
-        "max_depth": 4, "width": 2, "height": 1, "entries": [
-        {"s": 1, "t": 2, "raw": "raw_s01_t02.exr", "weighted": "weighted_s01_t02.exr",
+        "max_depth": 5, "width": 2, "height": 1, "entries": [
+        {"s": 1, "t": 2, "merge": false, "raw": "raw_s01_t02.exr", "weighted": "weighted_s01_t02.exr",
          "mean_raw": 3.5, "mean_weighted": 0.5, "dropped": 3},
-        {"s": 3, "t": 2, "raw": "raw_s03_t02.exr", "weighted": "weighted_s03_t02.exr",
+        {"s": 3, "t": 4, "merge": true,
+         "raw": "raw_merge_s03_t04.exr", "weighted": "weighted_merge_s03_t04.exr",
          "mean_raw": 0.5, "mean_weighted": 3.5, "dropped": 0},
-        {"s": 0, "t": 2, "raw": "raw_s00_t02.exr", "weighted": "weighted_s00_t02.exr",
+        {"s": 0, "t": 2, "merge": false, "raw": "raw_s00_t02.exr", "weighted": "weighted_s00_t02.exr",
          "mean_raw": 0.5, "mean_weighted": 0.0, "dropped": 1}]})"));
     Attributes said;
-    CHECK(bool(read_exr(folder / "t/raw_s03_t02.exr", &said).rgb == weighted));
+    CHECK(bool(read_exr(folder / "t/raw_merge_s03_t04.exr", &said).rgb == weighted));
     CHECK(said["s"] == 3);
-    CHECK(said["t"] == 2);
+    CHECK(said["t"] == 4);
+    CHECK(said["merge"] == 1);
     CHECK(said["technique"] == "raw");
-    CHECK(bool(read_exr(folder / "t/weighted_s03_t02.exr", &said).rgb == raw));
+    CHECK(bool(read_exr(folder / "t/weighted_merge_s03_t04.exr", &said).rgb == raw));
     CHECK(said["technique"] == "weighted");
 }
 

@@ -79,7 +79,7 @@ public:
     }
     std::vector<StrategyImage> strategy_images() override {
         const std::vector<float> values(size_t(film_.width) * film_.height * 3, float(rendered_));
-        return {{0, 2, values, values, 0}};
+        return {{0, 2, false, values, values, 0}};
     }
     RenderStats stats() override {
         RenderStats s;

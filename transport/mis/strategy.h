@@ -31,6 +31,14 @@ AMBILUX_HD uint32_t strategy_index(Strategy strategy) {
     return (k - 1) * (k + 2) / 2 + strategy.s();
 }
 
+/// Merges of a light subpath of s vertices with an eye subpath of t at one vertex that both count: s and t are at least
+/// 2, and paths have s + t - 2 segments.
+constexpr uint32_t merge_count(uint32_t max_depth) { return max_depth > 0 ? max_depth * (max_depth - 1) / 2 : 0; }
+AMBILUX_HD uint32_t merge_index(uint32_t s, uint32_t t) {
+    const uint32_t k = s + t - 2;
+    return (k - 1) * (k - 2) / 2 + s - 2;
+}
+
 /// The single strategies that are on, at most one for any number of segments, so that their weights are 1.
 struct SingleStrategies {
     static constexpr uint32_t kMaxSegments = 31;

@@ -13,18 +13,32 @@ struct MergeSum {
     const SceneView& scene;
     const Rules<MergingMis>& rules;
     const Vertex<MergingMis>& z;
-    uint32_t most_depth;  ///< of light subpaths
-    Rgb sum;
+    const Subpath<MergingMis>& path;  ///< that ends at z
+    uint32_t pixel;
+    const Accumulate& samples;
+    Rgb sum = {0.0f, 0.0f, 0.0f};
 
     /// Flux over an area is radiance times the cosine to that area.
     AMBILUX_HD void add(const MergeVertex& y) {
         const Vec3f d = octahedral_decode(y.d);
         const float cosine = fabsf(dot(z.point.ng, d));
-        if (y.front.depth > most_depth || !(cosine > 0.0f)) return;
+        if (path.depth + y.front.depth > rules.max_depth || !(cosine > 0.0f)) return;
         const BsdfValue f = rules.directions.template evaluate<F>(z, -d, TransportMode::radiance);
         if (is_zero(f.value)) return;
         const float ratio = rules.mis.merge_ratio(y.sums(), y.front.depth == 1, z.sums, z.first, f);
-        sum += f.value * y.flux * (mis_weight(ratio) / cosine);
+        const float weight = mis_weight(ratio);
+        sum += f.value * y.flux * (weight / cosine);
+        if (samples.strategies.sums) gather(y, f.value * y.flux * (1.0f / cosine), weight);
+    }
+    /// What is added to the sample.
+    AMBILUX_HD Rgb light(Rgb of_vertices) const { return path.throughput * of_vertices * (1.0f / rules.mis.eta()); }
+
+private:
+    /// For the image of this strategy.
+    AMBILUX_HD void gather(const MergeVertex& y, Rgb value, float weight) const {
+        const Wave& wave = samples.wave;
+        samples.strategies.add_merge(y.front.depth + 1, path.depth + 1, wave.width * wave.height, pixel, light(value),
+                                     light(value * weight));
     }
 };
 
@@ -47,11 +61,14 @@ struct Merge {
         at_mergeable<F>(scene, rules, Side::eye, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& z) {
             if (path.depth == 1 && !rules.mis.merges_first) return;
             const float radius = rules.mis.now->radius;
-            MergeSum<F> sum = {scene, rules, z, rules.max_depth - path.depth, {0.0f, 0.0f, 0.0f}};
+            const uint32_t pixel = wave.locate(hit.ray.path).pixel;
+            MergeSum<F> sum = {scene, rules, z, path, pixel, samples};
             NearVertices near = {state, MergeGrid::of(scene, radius), z.point.p, radius};
             for (uint32_t k; (k = near.next()) != kNone;) sum.add(state.sorted.load(k));
-            const Rgb light = path.throughput * sum.sum * (1.0f / rules.mis.eta());
-            if (!is_zero(light)) samples.push(Contribution{light, hit.ray.path});
+            const Rgb light = sum.light(sum.sum);
+            Accumulate gathered = samples;
+            gathered.strategies = {};
+            if (!is_zero(light)) gathered.push(Contribution{light, hit.ray.path});
         });
     }
 };
