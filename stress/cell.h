@@ -51,6 +51,7 @@ struct Cell {
     /// Methods (prefixes of names, separated by blanks) that find the light too rarely to say anything: an image that
     /// is black is then too noisy to judge. Of all others it is wrong.
     std::string rare = {};
+    std::string only = {};         ///< prefixes of names of methods that it is for; empty: all
     std::string not_mitsuba = {};  ///< why Mitsuba 3 cannot load the scene, or takes it for another
     double effort = 1;             ///< of the usual number of first samples, and of all those of --quick
     std::vector<std::pair<std::string, std::string>> settings = {};  ///< over those of the method

@@ -19,5 +19,6 @@ std::vector<Family> room_families();       ///< what must not change a room of s
 std::vector<Family> opacity_families();    ///< masked emitters and masks before them
 std::vector<Family> material_families();   ///< roughness, indices of refraction, panes
 std::vector<Family> depth_families();      ///< long paths with and without roulette
+std::vector<Family> merging_families();    ///< radius, number and places of light vertices
 
 }  // namespace ambilux::stress

@@ -185,6 +185,10 @@ private:
         Row row = blank_row(cell, method.name, backend_, benign);
         try {
             if (!scene) throw Error(ExitCode::bad_input, refusal);
+            if (!cell.only.empty() && !has_prefix_of(cell.only, method.name)) {
+                leave_out(row, "for " + cell.only + " alone");
+                return row;
+            }
             const RenderSettings settings = settings_of(hooks_, method, cell, *scene, backend_, request_.seed);
             if (const std::string why = reason_to_leave_out(cell, *scene, settings); !why.empty()) {
                 leave_out(row, why);
