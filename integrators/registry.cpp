@@ -62,6 +62,8 @@ void check(const Setting& s, const Place& at) {
     if (asked && !open && !at.has(s.applies)) at.refuse(s.what.key, value, s.because, s.applies);
     for (const Setting::Limit& limit : s.limits)
         if (value == limit.value && !at.has(limit.applies)) at.refuse(s.what.key, value, limit.because, limit.applies);
+    if (asked && s.of_auto && !at.settings.automatic)
+        at.refuse(s.what.key, value, "it has an effect with bdpt.auto=true alone", "");
     if (asked && at.settings.automatic && !s.against_auto.empty()) at.refuse(s.what.key, value, s.against_auto, "");
 }
 

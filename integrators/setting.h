@@ -102,6 +102,7 @@ struct Setting {
     std::vector<Limit> limits;                                 ///< values with an effect in some places only
     std::function<SettingValue(const RenderSettings&)> shown;  ///< in statistics, if not what.get
     std::string against_auto;   ///< why it cannot be combined with bdpt.auto=true; empty: it can
+    bool of_auto = false;       ///< has an effect with bdpt.auto=true alone
     bool left_to_auto = false;  ///< with bdpt.auto=true it need not apply to the variant that was asked for
     bool in_images = false;     ///< an attribute of image files, where it applies
     bool partial = false;       ///< leaves something out: not in a reference
@@ -115,6 +116,7 @@ struct Setting {
         return limits.push_back({std::move(value), a, std::move(why)}), std::move(*this);
     }
     Setting not_with_auto(std::string why) && { return against_auto = std::move(why), std::move(*this); }
+    Setting only_with_auto() && { return of_auto = true, std::move(*this); }
     Setting chosen_by_auto() && { return left_to_auto = true, std::move(*this); }
     Setting image_attribute() && { return in_images = true, std::move(*this); }
     Setting leaves_out() && { return partial = true, std::move(*this); }

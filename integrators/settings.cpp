@@ -160,6 +160,13 @@ std::vector<Setting> estimator_settings() {
                     "a short pilot chooses strategies, variant and numbers, the path tracer among them"))
             .where(has_strategies, "there is nothing to choose")
             .leaves_out(),
+        Is(Of::choice(
+               "allow", &S::allow, {"unbiased", "consistent"},
+               "what bdpt.auto=true may choose; consistent: merging (vcm) too, if a few samples of both show less "
+               "variance in the same time than the best of the others"))
+            .where(has_strategies, "there is nothing to choose")
+            .only_with_auto()
+            .leaves_out(),
         Is(Of::number("connections", &S::connections, 1u, kMaxCacheDraws, "light vertices that an eye vertex draws"))
             .where(draws_vertices, "no light vertices are drawn")
             .chosen_by_auto()

@@ -59,6 +59,12 @@ private:
 /// Highest probability of survival of Russian roulette unless asked otherwise, as in Mitsuba.
 constexpr float kRouletteCap = 0.95f;
 
+/// What bdpt.auto=true may choose.
+enum class Allow : uint32_t {
+    unbiased,
+    consistent,  ///< and what is biased, but converges to the right image
+};
+
 struct RenderSettings {
     std::string integrator = "path", variant = "wavefront";  ///< names of a Variant (registry.h)
     Choice<Backend> backend = Backend::automatic;
@@ -69,6 +75,7 @@ struct RenderSettings {
     SingleStrategies singles;              ///< if on, these and not the groups
     uint32_t technique_depth = 0;          ///< segments up to which images of single strategies are gathered
     bool automatic = false;                ///< a pilot chooses strategies, variant and connections
+    Allow allow = Allow::unbiased;         ///< from among what
     uint32_t connections = 3;              ///< light vertices that an eye vertex draws
     CacheDraws draws = CacheDraws::automatic;
     uint32_t light_subpaths_per_tile = kTilePixels;  ///< per pixel in multiples of 1/kTilePixels

@@ -16,6 +16,7 @@
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
 #include "render/chosen.h"
+#include "render/measured.h"
 
 namespace ambilux {
 namespace {
@@ -43,6 +44,7 @@ std::string joined(const SettingTexts& settings) {
 RenderSettings settings_of(const RenderSettings& settings, const SelectionCandidate& candidate) {
     RenderSettings s = settings;
     s.automatic = false;
+    s.allow = Allow::unbiased;
     for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
     if (!variant_of(s).traits.draws_together) s.draws = CacheDraws::automatic;  // others have no draws to be set
     return s;
@@ -155,6 +157,7 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
             for (SelectionOffer& offer : v.selection({settings, asked.traits, &v == &asked, cuda, light_paths}))
                 all.push_back(candidate_of(v, std::move(offer), light_paths));
         }
+    std::stable_partition(all.begin(), all.end(), [](const SelectionCandidate& c) { return !c.offer.measured; });
     return all;
 }
 
@@ -203,10 +206,12 @@ public:
     Selection(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make)
         : scene_(scene), settings_(settings), cuda_(cuda), make_(make),
           candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {
+        const uint32_t allowed = kAllStrategies | (settings.allow == Allow::consistent ? kMergeStrategies : 0u);
         for (const SelectionCandidate& c : candidates_) {
             const std::string path = unreachable_path(scene.features, sampled_strategies(settings_of(settings, c)),
-                                                      kAllStrategies, settings.max_depth);
+                                                      allowed, settings.max_depth);
             excluded_.push_back(path.empty() ? "" : "cannot find paths such as " + path);
+            if (c.offer.measured && settings.deterministic) excluded_.back() = "is compared by the clock";
         }
     }
 
@@ -216,11 +221,13 @@ public:
         if (ahead && settings_.expected_samples == 0 && excluded_[0].empty())
             head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
         std::vector<PilotCandidate> predicted;
-        for (const SelectionCandidate& c : candidates_) predicted.push_back(c.pilot);
+        for (const SelectionCandidate& c : candidates_)
+            if (!c.offer.measured) predicted.push_back(c.pilot);
         const Pilot pilot =
             run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
+        variance_.resize(candidates_.size(), double(kInfinity));
         for (size_t c = 0; c < candidates_.size(); ++c) {
             if (eye_subpaths(pilot) < candidates_[c].offer.least_subpaths)
                 excluded_[c] = "has too few samples to learn from";
@@ -233,6 +240,9 @@ public:
             time(ranked_[0], *rival);
             rank();
         }
+        for (size_t c = predicted.size(); c < candidates_.size(); ++c)
+            if (excluded_[c].empty()) measure_beside(ranked_[0], c, pilot.expected_samples);
+        rank();
 
         choosing_ = seconds_since(start_);
         std::unique_ptr<Renderer> renderer = take_head_start();
@@ -288,6 +298,24 @@ private:
             cost_[c] = seconds_[like] * work_[c] / work_[like];
             // Families that work has put behind both need not win by the error of its estimate.
             if (family(candidates_[c]) != family(candidates_[like])) cost_[c] *= kDoubt;
+        }
+    }
+
+    /// Scales what is known of the best to a candidate that was not predicted. Of samples behind those that are
+    /// expected: a radius that shrinks is smallest there, and variance greatest.
+    void measure_beside(size_t best, size_t other, double behind) {
+        if (!excluded_[best].empty()) return void(variance_[other] = 1.0);
+        try {
+            const auto measured = [&](size_t c) {
+                return measure(settings_of(settings_, candidates_[c]), make_, uint32_t(behind));
+            };
+            const Measured a = measured(best), b = measured(other);
+            variance_[other] = variance_[best] * measured_ratio(a, b);
+            cost_[other] = cost_[best];
+            seconds_[other] = b.seconds;
+        } catch (const Error& error) {
+            if (error.code != ExitCode::device) throw;
+            excluded_[other] = "found no room to be measured";
         }
     }
 

@@ -9,7 +9,7 @@
 
 namespace ambilux {
 
-/// What `settings` leave to choose from, the path tracer first.
+/// What `settings` leave to choose from, the path tracer first, those that are measured last.
 struct SelectionCandidate {
     std::string name;
     PilotCandidate pilot;  ///< with the uniform draws that those of the offer are taken to be worth

@@ -125,6 +125,21 @@ TEST_CASE("bad input ends with code 3, what cannot be written with code 4, befor
     CHECK(run(folder, render(folder, {}, ".")).code == 4);
 }
 
+TEST_CASE("what an image says of its bias is told by render and by compare") {
+    const test::TempFolder folder;
+    for (const char* integrator : {"pm", "path"}) {
+        INFO(integrator);
+        const bool biased = std::string(integrator) == "pm";
+        const std::string says = "biased by a radius of";
+        Outcome o = run(folder, render(folder, {"-i", integrator}));
+        REQUIRE(o.code == 0);
+        CHECK(contains(o.err + o.out, says) == biased);
+        o = run(folder, {"compare", folder / "a.exr", folder / "a.exr"});
+        REQUIRE(o.code == 0);
+        CHECK(contains(o.out, "the image says: " + says) == biased);
+    }
+}
+
 TEST_CASE("scenes of all formats are converted, and the result renders") {
     const test::TempFolder folder;
     const std::string pbrt = folder.write(

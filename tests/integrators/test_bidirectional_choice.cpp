@@ -684,6 +684,38 @@ TEST_CASE("how light vertices are drawn can be set beside the selection, whichev
     }
 }
 
+TEST_CASE("allow=consistent: merging is compared with the best of the others, and chosen where it alone finds light") {
+    const auto merging = [](const RenderResult& r) {
+        const auto& all = r.stats.selection.candidates;
+        const auto at = std::find_if(all.begin(), all.end(), [](const auto& c) { return c.name == "vcm"; });
+        return at == all.end() ? nullptr : &*at;
+    };
+    const Scene glass = project_scene("glass", 24, 16);
+    RenderSettings s = automatic_settings(glass);
+    CHECK(merging(render_scene(glass, s, 2)) == nullptr);
+    apply_setting(s, "allow", "consistent");
+    const RenderResult r = render_scene(glass, s, 2);
+    REQUIRE(merging(r));
+    CHECK(merging(r)->seconds > 0);
+    CHECK(std::isfinite(merging(r)->variance));
+    CHECK((merging(r)->efficiency > 1) == false);  // none is better than the selection
+    s.deterministic = true;
+    CHECK(merging(render_scene(glass, s, 2))->excluded == "is compared by the clock");
+    s.deterministic = s.automatic = false;
+    CHECK_THROWS_WITH(make_renderer(glass, s), ContainsSubstring("bdpt.auto=true alone"));
+
+    const Scene pane = scene_from_text(scene_xml(
+        4, kView + kGround +
+               "<emitter type='point'><point name='position' x='0.5' y='0' z='1.5'/></emitter><shape type='rectangle'>"
+               "<transform name='to_world'><scale value='9'/><translate z='0.4'/></transform><bsdf "
+               "type='thindielectric'/></shape>"));
+    RenderSettings of_pane = automatic_settings(pane);
+    apply_setting(of_pane, "allow", "consistent");
+    const RenderResult seen = render_scene(pane, of_pane, 2);
+    CHECK(seen.stats.selection.name == "vcm");
+    CHECK(seen.stats.selection.candidates[0].excluded.find("cannot find paths") == 0);
+}
+
 TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {
     const Scene dark = scene_from_text(scene_xml(4, kView + kGround));
     CHECK(render_scene(dark, automatic_settings(dark), 2).stats.selection.name == "path");

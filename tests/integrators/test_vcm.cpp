@@ -175,4 +175,23 @@ TEST_CASE("vcm: iterations are whole, a render goes on from its film alone, and 
     apply_setting(s, "merge_samples", "64");
     CHECK_THROWS_WITH(make_renderer(large, s), ContainsSubstring("merge_samples=64") && ContainsSubstring("4096x4096"));
     CHECK_THROWS_WITH(make_renderer(scene, vcm_settings(scene, "1e-7")), ContainsSubstring("merge_radius=1e-07"));
+    CHECK_THROWS_WITH(make_renderer(scene, vcm_settings(scene, "2")), ContainsSubstring("merge_unit=world"));
+}
+
+TEST_CASE("The radius of merges in other units is the same radius") {
+    const Scene scene = project_scene("cornell", 24, 24);
+    const double bounds = double(scene.view().bounds_radius);
+    const FilmMoments film = render_scene(scene, vcm_settings(scene, "0.0625"), 2).film;
+    RenderSettings world = vcm_settings(scene, std::to_string(float(0.0625 * bounds)).c_str());
+    apply_setting(world, "merge_unit", "world");
+    const FilmMoments in_world = render_scene(scene, world, 2).film;
+    CHECK(mean_of(in_world) == Approx(mean_of(film)).epsilon(1e-5));
+    CHECK(bias_text(world).find("units of the scene that shrinks") != std::string::npos);
+    RenderSettings open = vcm_settings(scene, "0"), pixel = vcm_settings(scene, "1");
+    apply_setting(pixel, "merge_unit", "pixel");
+    // At 24 x 24 a pixel is larger than 0.003 of the scene, which is what an open radius has.
+    CHECK(mean_of(render_scene(scene, vcm_settings(scene, "0.003"), 2).film) ==
+          Approx(mean_of(render_scene(scene, open, 2).film)).epsilon(1e-6));
+    CHECK(mean_of(render_scene(scene, pixel, 2).film) != mean_of(render_scene(scene, open, 2).film));
+    CHECK(bias_text(pixel).find("a radius of 1 pixels") != std::string::npos);
 }

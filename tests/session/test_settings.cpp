@@ -33,7 +33,7 @@ std::string refusal(const std::function<void()>& f) {
 std::string another(const Setting& s) {
     const std::string standard = s.default_text();
     for (const char* value : {"true", "false", "light", "lvc", "cpu", "nee", "power", "hits", "coherent", "cwbvh",
-                              "none", "select", "double", "pinned", "0.25", "2", "1"}) {
+                              "none", "select", "double", "pinned", "consistent", "world", "0.25", "2", "1"}) {
         RenderSettings settings;
         try {
             s.what.set(settings, value);

@@ -25,8 +25,8 @@ struct VcmIntegrator {
     }
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         if (!p.light_subpaths()) return 0.0;
-        const float pixel = p.vcm.open_radius() ? pixel_radius<F>(scene, tracer) / scene.bounds_radius : 0.0f;
-        p.first_radius = p.vcm.first_radius(pixel) * scene.bounds_radius;
+        const float pixel = p.vcm.asks_pixels() ? pixel_radius<F>(scene, tracer) : 0.0f;
+        p.first_radius = p.vcm.first_radius(scene.bounds_radius, pixel);
         const double mean = mean_light_vertices<F>(scene, tracer, p.rules, seed);
         if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = float(p.cache_draws / mean);
         p.size_table(mean);

@@ -18,6 +18,7 @@ protected:
         return {.strategies = merges == Merges::beside,
                 .light_subpaths = true,
                 .draws = merges == Merges::beside,
+                .strategy_images = true,
                 .weights = merges != Merges::first,
                 .culls = shadow_rays,
                 .sorts = false,
@@ -36,6 +37,14 @@ struct VcmVariant : MergingVariant {
     /// With the radius that papers use. Corners and edges are what it does not fit to.
     static std::vector<Stressed> stress() { return {{"vcm", {}, false, 0.01}}; }
     static uint32_t strategies(const RenderSettings& s) { return s.strategies | kMergeStrategies; }
+    /// Once, with the default of light subpaths.
+    static std::vector<SelectionOffer> selection(const SelectionRequest& r) {
+        if (r.settings.allow != Allow::consistent || r.light_paths != 1.0f) return {};
+        SelectionOffer offer;
+        offer.settings = {{"strategies", "all"}};
+        offer.connect = offer.measured = true;
+        return {offer};
+    }
 };
 
 struct BpmVariant : MergingVariant {

@@ -1,0 +1,62 @@
+#include "render/measured.h"
+
+#include <algorithm>
+
+#include "integrators/auto/film_footprint.h"
+#include "render/statistics.h"
+
+namespace ambilux {
+namespace {
+
+constexpr uint32_t kSamples = 4;
+constexpr uint32_t kMostBlocks = 32, kSmallestBlock = 4;  ///< a side; pixels of a side
+
+std::vector<double> variance_by_block(const FilmMoments& film) {
+    const auto blocks = [](uint32_t pixels) { return std::clamp(pixels / kSmallestBlock, 1u, kMostBlocks); };
+    const FilmBlocks all = {blocks(film.width), blocks(film.height)};
+    const double n = double(film.samples);
+    std::vector<double> variance;
+    for (uint32_t b = 0; b < all.count(); ++b) {
+        const uint32_t x0 = FilmBlocks::edge(b % all.x, film.width, all.x),
+                       x1 = FilmBlocks::edge(b % all.x + 1, film.width, all.x),
+                       y0 = FilmBlocks::edge(b / all.x, film.height, all.y),
+                       y1 = FilmBlocks::edge(b / all.x + 1, film.height, all.y);
+        double sum[3] = {}, of_pixels[3] = {};
+        for (uint32_t y = y0; y < y1; ++y)
+            for (uint32_t x = x0; x < x1; ++x)
+                for (size_t c = 0; c < 3; ++c) {
+                    const size_t i = (size_t(y) * film.width + x) * 3 + c;
+                    const double mean = film.sum[i] / n;
+                    sum[c] += mean;
+                    of_pixels[c] += std::max(0.0, film.sum_squares[i] / n - mean * mean) * n / (n - 1);
+                }
+        const double pixels = double(x1 - x0) * (y1 - y0);
+        double relative = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double mean = sum[c] / pixels;
+            relative += of_pixels[c] / pixels / (mean * mean + 0.01) / 3;
+        }
+        variance.push_back(relative);
+    }
+    return variance;
+}
+
+}  // namespace
+
+Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint32_t first) {
+    const std::unique_ptr<Renderer> renderer = make(settings);
+    renderer->render(first, 1);
+    const auto start = Clock::now();
+    renderer->render(first + 1, kSamples - 1);
+    const double seconds = seconds_since(start) / (kSamples - 1);
+    return {variance_by_block(renderer->film()), seconds};
+}
+
+double measured_ratio(const Measured& a, const Measured& b) {
+    Pilot both;
+    both.variance = {a.variance, b.variance};
+    const std::vector<double> variance = selection_variances(both);
+    return variance[1] * b.seconds / (variance[0] * a.seconds);
+}
+
+}  // namespace ambilux
