@@ -131,6 +131,54 @@ def blob_ply(name, rows=24, columns=48):
     (ASSETS / name).write_bytes("\n".join(header).encode() + b"\n" + vertices.tobytes() + face_data.tobytes())
 
 
+def write_ply(name, points, normals):
+    """Binary little-endian PLY of a grid of points and normals, shape (rows, columns, 3). The outside of its triangles is that of
+    d/d(columns) x d/d(rows)."""
+    rows, columns = points.shape[0] - 1, points.shape[1] - 1
+    normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    vertices = np.concatenate([points, normals], -1).reshape(-1, 6).astype("<f4")
+    corner = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2).reshape(-1, 3)
+    # A point where a circle has shrunk to nothing: triangles without area are left out.
+    corners = vertices[faces, :3]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
+    faces = faces[area > 1e-12]
+    face_data = np.zeros(len(faces), dtype=[("n", "u1"), ("i", "<u2", 3)])
+    face_data["n"] = 3
+    face_data["i"] = faces
+    header = ["ply", "format binary_little_endian 1.0", "comment made by scenes/make_assets.py", f"element vertex {len(vertices)}"]
+    header += [f"property float {p}" for p in ("x", "y", "z", "nx", "ny", "nz")]
+    header += [f"element face {len(faces)}", "property list uchar ushort vertex_indices", "end_header"]
+    (ASSETS / name).write_bytes("\n".join(header).encode() + b"\n" + vertices.tobytes() + face_data.tobytes())
+
+
+def water_ply(name, cells=40):
+    """A square [-1,1]^2 of water about y = 0 with low waves in four directions; its outside is above."""
+    waves = [(7, 3, 0.4, 0.018), (-4, 8, 1.9, 0.015), (11, -6, 4.0, 0.0075), (2, -10, 5.1, 0.01)]  # wave vector, phase, height
+    c = np.linspace(-1, 1, cells + 1)
+    x, z = np.meshgrid(c, -c)
+    y, dx, dz = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for kx, kz, phase, height in waves:
+        y += height * np.sin(kx * x + kz * z + phase)
+        dx += height * kx * np.cos(kx * x + kz * z + phase)
+        dz += height * kz * np.cos(kx * x + kz * z + phase)
+    write_ply(name, np.stack([x, y, z], -1), np.stack([-dx, np.ones_like(x), -dz], -1))
+
+
+def basin_ply(name, columns=40):
+    """A round bowl of radius 1 and height 0.6 with a rim, around +y: a profile from the middle of its inside to that of its foot."""
+    inside = [(0.94 * np.sin(a), 0.6 - 0.52 * np.cos(a)) for a in np.linspace(0, np.pi / 2, 11)]
+    rim = [(0.97 + 0.03 * np.cos(a), 0.6 + 0.03 * np.sin(a)) for a in np.linspace(np.pi, 0, 7)[1:]]
+    outside = [(0.45 + 0.55 * np.cos(a), 0.6 - 0.6 * np.sin(a)) for a in np.linspace(0, np.pi / 2, 9)[1:]]
+    profile = np.array(inside + rim + outside)
+    slope = np.gradient(profile, axis=0)
+    slope[0] = (1, 0)
+    phi = np.linspace(0, 2 * np.pi, columns + 1)
+    ring = lambda radial, up: np.stack([radial[:, None] * np.cos(phi), up[:, None] + 0 * phi, radial[:, None] * np.sin(phi)], -1)
+    write_ply(name, ring(profile[:, 0], profile[:, 1]), ring(-slope[:, 1], slope[:, 0]))
+
+
 def main():
     ASSETS.mkdir(exist_ok=True)
     save_png("tiles.png", tiles())
@@ -141,6 +189,8 @@ def main():
     OpenEXR.File(header, {"RGB": sky()}).write(str(ASSETS / "sky.exr"))
     torus_obj("torus.obj")
     blob_ply("blob.ply")
+    water_ply("water.ply")
+    basin_ply("basin.ply")
 
 
 if __name__ == "__main__":
