@@ -209,6 +209,12 @@ Watched make_watched(const RenderArguments& o, const Scene& scene, const RenderS
     watched.renderer = std::move(invalid);
     if (o.outliers == 0) return watched;
     check_replay(used_settings(settings, watched.renderer->stats()));
+    if (const uint32_t together = watched.renderer->iteration_samples(); together > 1)
+        throw Error(
+            ExitCode::usage,
+            fmt::format("--outliers: this render adds {} samples of a pixel to the film at once (merge_samples); "
+                        "single ones are seen with merge_samples=1",
+                        together));
     auto samples = std::make_unique<SampleWatch>(std::move(watched.renderer));
     watched.samples = samples.get();
     watched.renderer = std::move(samples);

@@ -98,7 +98,8 @@ void add_trace(CLI::App& app, Run& run) {
     command.add_option("--sample", o->sample, "Sample of the pixel, from 0")->required();
     command.add_option("--light-subpath", o->light_subpath,
                        "Light subpath of the sample by its number: shown too, or, without --pixel, alone");
-    command.add_option("--strategy", o->strategy, "Show contributions of this strategy only, such as s1t3");
+    command.add_option("--strategy", o->strategy,
+                       "Show contributions of this strategy only, such as s1t3, or s2+t3 for merges");
     command.add_flag("--compare", o->compare,
                      "Render the sample too, with --backend cuda on the device, and say from how many segments on it "
                      "differs from the replay");

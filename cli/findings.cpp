@@ -67,7 +67,7 @@ nlohmann::json contribution_json(const ReplayCandidate& c) {
     if (c.fate != ReplayFate::arrived && c.fate != ReplayFate::invalid) return nullptr;
     if (c.kind[0] == '\0') return nullptr;
     return {{"kind", c.kind},
-            {"strategy", strategy_text(c.strategy)},
+            {"strategy", strategy_text({c.strategy, c.merged})},
             {"eye_depth", c.eye_depth},
             {"light_depth", c.light_depth},
             {"light_subpath", c.light_subpath == kNone ? nlohmann::json(nullptr) : nlohmann::json(c.light_subpath)},
@@ -80,7 +80,7 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
                         p.x, p.y, p.sample, p.value[0], p.value[1], p.value[2], p.excess);
     if (o.largest.fate == ReplayFate::arrived)
         text += fmt::format("  largest contribution: {}, {}, {}: ({:.6g}, {:.6g}, {:.6g})\n",
-                            strategy_text(o.largest.strategy), o.largest.kind, ends_of(o.largest),
+                            strategy_text({o.largest.strategy, o.largest.merged}), o.largest.kind, ends_of(o.largest),
                             o.largest.contribution.x, o.largest.contribution.y, o.largest.contribution.z);
     bool differs = false;
     for (int c = 0; c < 3; ++c) differs |= std::abs(o.replayed[c] - p.value[c]) > 1e-3 * std::abs(p.value[c]) + 1e-9;
@@ -105,10 +105,11 @@ void report_invalid(const InvalidRecord& r, const std::string& command, nlohmann
         eye ? fmt::format("pixel {},{}", r.x, r.y) : fmt::format("light subpath {}", r.light_subpath);
     log_warning(fmt::format("stage {} dropped a value ({}) of {} sample {}{}; to replay it:\n  {}", r.drop.stage,
                             r.drop.what, where, r.sample,
-                            r.candidate.kind[0] ? fmt::format(", {}, {}, {}", strategy_text(r.candidate.strategy),
-                                                              r.candidate.kind, ends_of(r.candidate))
-                            : eye               ? ", a ray, a throughput or the sum"
-                                                : ", a ray or a throughput",
+                            r.candidate.kind[0]
+                                ? fmt::format(", {}, {}, {}", strategy_text({r.candidate.strategy, r.candidate.merged}),
+                                              r.candidate.kind, ends_of(r.candidate))
+                            : eye ? ", a ray, a throughput or the sum"
+                                  : ", a ray or a throughput",
                             command));
     list.push_back({{"stage", r.drop.stage},
                     {"what", r.drop.what},

@@ -13,6 +13,7 @@ enum class ReplayPairing : uint32_t {
     registers,    ///< the same, with the eye vertex as it is instead of as items keep it
     own_vertex,   ///< those of a light subpath that is made for this eye vertex, from its start
     cache,        ///< drawn from those of a wave
+    iteration,    ///< drawn from those of an iteration, and merged with those nearby
 };
 
 /// How a variant makes references (experiments/reference.h), for which its default settings must find all light.

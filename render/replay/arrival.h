@@ -63,6 +63,12 @@ public:
         occlude(shadow, out);
     }
 
+    /// What all merges of a vertex bring together; false if it is dropped.
+    bool merged(Rgb light, ReplayDrop& drop) {
+        Accumulate{{}, &sample_, watch_.record(), {}, {}}.push(Contribution{light, 0});
+        return !watch_.dropped(Accumulate::kName, drop);
+    }
+
 private:
     static void fill(Rgb value, float ratio, Strategy strategy, ReplayCandidate& out) {
         out.value = value;
@@ -99,7 +105,8 @@ private:
 };
 
 /// A splat candidate: mis_weight and occlude. `out` has its value on the film where the filter is 1.
-inline void splat_arrival(const ReplayContext<BidirectionalMis>& ctx, const CandidateItem& c, ReplayCandidate& out) {
+template <class Mis>
+void splat_arrival(const ReplayContext<Mis>& ctx, const CandidateItem& c, ReplayCandidate& out) {
     out.value = c.value;
     out.ratio = c.ratio;
     out.weight = mis_weight(c.ratio);
@@ -119,7 +126,7 @@ inline void splat_arrival(const ReplayContext<BidirectionalMis>& ctx, const Cand
         return void(out.fate = ReplayFate::invalid);
     }
     const Ray ray = {c.origin, c.tmax, c.direction, c.opacity_seed};
-    const bool blocked = ctx.tracer.occluded<kReplayFeatures>(ctx.view, ray);
+    const bool blocked = ctx.tracer.template occluded<kReplayFeatures>(ctx.view, ray);
     out.fate = blocked ? ReplayFate::blocked : ReplayFate::arrived;
     if (!blocked) out.contribution = weighted.value;
 }

@@ -31,7 +31,7 @@ LengthComparison difference(uint32_t segments, const Sums& before, const Sums& n
 uint32_t longest_path(const ReplaySample& sample) {
     uint32_t longest = uint32_t(sample.eye.vertices.size());
     for (const auto* all : {&sample.candidates, &sample.splats})
-        for (const ReplayCandidate& c : *all) longest = std::max(longest, c.strategy.s() + c.strategy.t() - 1);
+        for (const ReplayCandidate& c : *all) longest = std::max(longest, c.segments());
     return longest;
 }
 
@@ -39,7 +39,8 @@ uint32_t longest_path(const ReplaySample& sample) {
 
 FilmMoments rendered_film(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
-    renderer->render(sample, 1);
+    const uint32_t together = renderer->iteration_samples();
+    renderer->render(sample / together * together, together);
     return renderer->film();
 }
 
@@ -56,8 +57,14 @@ std::vector<LengthComparison> compare_by_length(const Scene& scene, RenderSettin
         Sums s;
         const FilmMoments rendered = film(settings, request.sample);
         std::copy_n(rendered.sum.begin() + ptrdiff_t(at), 3, s.rendered);
-        const ReplaySample replayed = make_replay(scene, settings, accels)->sample(request);
-        std::copy_n(replayed.total, 3, s.replayed);
+        const std::unique_ptr<Replay> replay = make_replay(scene, settings, accels);
+        const uint32_t together = replay->iteration_samples();
+        ReplayRequest one = request;
+        for (uint32_t k = 0; k < together; ++k) {
+            one.sample = request.sample / together * together + k;
+            const ReplaySample replayed = replay->sample(one);
+            for (int c = 0; c < 3; ++c) s.replayed[c] += replayed.total[c];
+        }
         return s;
     };
     std::vector<LengthComparison> lengths;

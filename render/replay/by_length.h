@@ -8,7 +8,8 @@
 
 namespace ambilux {
 
-/// What paths of this many segments brought to a sample.
+/// What paths of this many segments brought to a sample or, where those of an iteration share light subpaths, to all
+/// of the iteration.
 struct LengthComparison {
     uint32_t segments = 0;
     bool or_more = false;
@@ -17,7 +18,7 @@ struct LengthComparison {
     bool differs = false;  ///< by more than roundings of values do
 };
 
-/// The film of one sample of a render with these settings.
+/// The film of one sample of a render with these settings, or of its iteration.
 using FilmOf = std::function<FilmMoments(const RenderSettings& settings, uint32_t sample)>;
 FilmMoments rendered_film(const Scene& scene, const RenderSettings& settings, uint32_t sample);
 

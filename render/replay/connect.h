@@ -2,46 +2,49 @@
 #pragma once
 
 #include "render/replay/eye.h"
-#include "render/replay/light_cache.h"
 #include "stages/connect_vertices.h"
 
 namespace ambilux {
 
 /// The eye vertex `z` of a sample, joined with light vertices. `scale`: beyond that of the render's own stage.
+/// `lights`: the vertices of `source`, which know their light subpaths.
+template <class Source, class Lights>
 struct ReplayConnections {
-    ReplayEye<BidirectionalMis>& eye;
-    const BidirectionalVertex& vertex;
-    const Subpath<BidirectionalMis>& path;
-    const ReplayVertices& lights;
-    LightVertexSource<BidirectionalMis> source;
+    using Mis = typename Source::Mis;
+
+    ReplayEye<Mis>& eye;
+    const Vertex<Mis>& vertex;
+    const Subpath<Mis>& path;
+    const Lights& lights;
+    Source source;
     WaveState state{};
     float scale = 1.0f;
 
-    BidirectionalEnd exact_end() const { return {vertex, path.throughput, path.depth}; }
-    BidirectionalEnd packed_end() const { return rounded_end<kReplayFeatures>(eye.ctx.view, vertex, path); }
+    SubpathEnd<Mis> exact_end() const { return {vertex, path.throughput, path.depth}; }
+    SubpathEnd<Mis> packed_end() const { return rounded_end<kReplayFeatures>(eye.ctx.view, vertex, path); }
 
     /// The vertices that a search of the render's stages finds.
     void searched() const {
-        const LightVertexSearch<BidirectionalMis> search = {source, eye.numbers.key, path.depth, vertex,
-                                                            eye.ctx.rules.max_depth};
+        const auto search =
+            source.search(eye.numbers.key, path.depth, vertex, eye.ctx.rules.max_depth, source.link(vertex, 0));
         uint32_t next = source.first(0), found = search.find(next);
         if (found == kNone) return;
-        const BidirectionalEnd end = packed_end();
+        const SubpathEnd<Mis> end = packed_end();
         for (; found != kNone; found = search.find(next)) pair(end, found);
     }
-    void all_backwards(const BidirectionalEnd& end) const {
-        for (uint32_t i = lights.size(); i-- > 0;)
+    void all_backwards(const SubpathEnd<Mis>& end) const {
+        for (uint32_t i = source.vertices.counter->size(); i-- > 0;)
             if (path.depth + source.vertices.items.load_front(i).bits.depth() + 1 <= eye.ctx.rules.max_depth)
                 pair(end, i);
     }
-    void all_forwards(const BidirectionalEnd& end) const {
-        for (uint32_t i = 0; i < lights.size(); ++i) pair(end, i);
+    void all_forwards(const SubpathEnd<Mis>& end) const {
+        for (uint32_t i = 0; i < source.vertices.counter->size(); ++i) pair(end, i);
     }
 
 private:
-    void pair(const BidirectionalEnd& end, uint32_t place) const {
+    void pair(const SubpathEnd<Mis>& end, uint32_t place) const {
         const auto& ctx = eye.ctx;
-        const ConnectionVertex<BidirectionalMis> light = load_vertex<kReplayFeatures>(source.vertices, place);
+        const ConnectionVertex<Mis> light = load_vertex<kReplayFeatures>(source.vertices, place);
         CandidateItem item;
         bool pushed = false;
         DropWatch watch;
@@ -52,7 +55,7 @@ private:
         if (!pushed && !dropped) return;
         ReplayCandidate& r = eye.add("connection");
         r.light_depth = light.bits().depth();
-        r.light_subpath = lights.owner(place);
+        lights.name_owner(place, r);
         if (eye.details) r.densities = connection_densities(end, unpack_end<kReplayFeatures>(ctx.view, light));
         if (pushed) {
             item.value *= scale;

@@ -82,7 +82,9 @@ void describe_departure(const ReplayContext<Mis>& ctx, Side side, uint32_t longe
     const Vec4f u = numbers.scatter(side, before.depth);
     ScatterSample s;
     if (!ctx.rules.directions.template sample<F>(vertex, {u.x, u.y, u.z}, transport_mode(side), s))
-        return void(v.end = "the BSDF scatters nothing");
+        return void(v.end = BsdfDirections::sample<F>(vertex, {u.x, u.y, u.z}, transport_mode(side), s)
+                                ? "the method goes on through delta lobes only"
+                                : "the BSDF scatters nothing");
     v.scatter = {true, s.wo, s.pdf_sa, s.pdf_reverse_sa, bool(s.flags & kScatterDelta), s.weight, s.eta, {}};
     v.scatter.roulette = describe_roulette(ctx, side, vertex, u, before);
     if (!goes_on) v.end = why_scattering_ends(ctx, before, v.scatter);
@@ -148,8 +150,8 @@ std::vector<ReplayNumber> next_event_densities(const ReplayContext<Mis>& ctx, co
 }
 
 /// s, t >= 2.
-inline std::vector<ReplayNumber> connection_densities(const SubpathEnd<BidirectionalMis>& z,
-                                                      const SubpathEnd<BidirectionalMis>& y) {
+template <class Mis>
+std::vector<ReplayNumber> connection_densities(const SubpathEnd<Mis>& z, const SubpathEnd<Mis>& y) {
     constexpr Features F = kReplayFeatures;
     const Vec3f to_y = y.vertex.point.p - z.vertex.point.p;
     const float distance = length(to_y);

@@ -10,17 +10,26 @@
 
 namespace ambilux {
 
+template <class Mis>
+struct ReplayEye;
+
+/// How an eye subpath is joined with light subpaths; what a method does not do is empty.
+template <class Mis>
+struct ReplayJoins {
+    std::function<void(ReplayEye<Mis>&, const Vertex<Mis>&, const Subpath<Mis>&)> connect;
+    std::function<void(ReplayEye<Mis>&)> merge;  ///< where its ray ended
+};
+
 /// One eye subpath on its way.
 template <class Mis>
 struct ReplayEye {
-    using At = std::function<void(ReplayEye&, const Vertex<Mis>&, const Subpath<Mis>&)>;
     /// The stage that samples emitters; false if it pushed no candidate.
     using SampleEmitter = std::function<bool(const ReplayContext<Mis>&, const Vertex<Mis>&, const Subpath<Mis>&,
                                              const RandomNumbers&, StageRecord*, CandidateItem&)>;
 
     const ReplayContext<Mis>& ctx;
     const SampleEmitter& sample_emitter;
-    const At& connect;  ///< may be empty
+    const ReplayJoins<Mis>& joins;
     bool details;
     RandomNumbers numbers;
     ReplaySample& out;
@@ -64,11 +73,12 @@ struct ReplayEyeSink {
     void arrived(const Subpath<Mis>& path, const Hit& hit) const {
         eye.ray = path;
         eye.hit = hit;
+        if (eye.joins.merge) eye.joins.merge(eye);
     }
     void add(const Candidate<Mis>& c) const { eye.found(c); }
     void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const RandomNumbers&) const {
         eye.next_event(z, path);
-        if (eye.connect) eye.connect(eye, z, path);
+        if (eye.joins.connect) eye.joins.connect(eye, z, path);
     }
     bool valid(Rgb throughput) const {
         DropWatch watch;
@@ -96,13 +106,13 @@ bool sample_next_event(const ReplayContext<Mis>& ctx, const Vertex<Mis>& z, cons
 /// The eye subpath of `out`'s pixel and sample; what it brings is in out.eye_sum.
 template <class Mis>
 void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::SampleEmitter& sample_emitter,
-                const typename ReplayEye<Mis>::At& connect, bool details, ReplaySample& out) {
+                const ReplayJoins<Mis>& joins, bool details, ReplaySample& out) {
     if (ctx.rules.max_depth == 0) return;
     const uint32_t pixel = out.y * ctx.view.sensor.crop_width + out.x;
     out.eye.side = Side::eye;
     out.eye.number = pixel;
     const RandomNumbers numbers = {{out.seed, pixel, out.sample, Stream::eye}};
-    ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, numbers, out, EyeArrival<Mis>(ctx)};
+    ReplayEye<Mis> eye{ctx, sample_emitter, joins, details, numbers, out, EyeArrival<Mis>(ctx)};
     float tmax;
     const auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, numbers, tmax);
     replay_subpath(ctx, ctx.rules.longest(Side::eye), first, tmax, ReplayEyeSink<Mis>{eye}, details, out.eye);

@@ -10,13 +10,15 @@
 
 namespace ambilux {
 
+template <class Mis>
 struct ReplayLight {
     ReplaySubpath subpath;
-    std::vector<ConnectionVertex<BidirectionalMis>> vertices;  ///< as a wave keeps them, without links
+    std::vector<ConnectionVertex<Mis>> vertices;  ///< as a wave keeps them, without links
     std::vector<ReplayCandidate> splats;
 };
 
 /// Which light subpath, and what is asked of it.
+template <class Mis>
 struct ReplayLightRequest {
     uint64_t seed = 0;
     uint32_t number = 0, part = 0, sample = 0;  ///< ReplaySubpath
@@ -26,16 +28,19 @@ struct ReplayLightRequest {
     /// False for places on the film that do not matter: no shadow ray is traced for them.
     std::function<bool(Vec2f film)> matters = [](Vec2f) { return true; };
     /// True for vertices that connections may use.
-    std::function<bool(const BidirectionalVertex&, uint32_t depth)> keeps;
+    std::function<bool(const Vertex<Mis>&, uint32_t depth)> keeps;
+    /// Sees where its rays end; may be empty.
+    std::function<void(const Subpath<Mis>&, const Hit&)> arrived;
 
     RandomNumbers numbers() const { return {{seed, number, sample, Stream::light}, part}; }
 };
 
 /// A splat candidate goes through the stages of a render.
+template <class Mis>
 struct ReplaySplats {
-    const ReplayContext<BidirectionalMis>& ctx;
-    const ReplayLightRequest& request;
-    ReplayLight& light;
+    const ReplayContext<Mis>& ctx;
+    const ReplayLightRequest<Mis>& request;
+    ReplayLight<Mis>& light;
 
     uint32_t push(const CandidateItem& c) const {
         if (!request.splats || !request.matters(c.film)) return 0;
@@ -60,20 +65,23 @@ struct ReplaySplats {
     }
 };
 
+template <class Mis>
 struct ReplayLightSink {
-    const ReplaySplats& splats;
+    const ReplaySplats<Mis>& splats;
 
     RandomNumbers numbers() const { return splats.request.numbers(); }
-    void arrived(const Subpath<BidirectionalMis>&, const Hit&) const {}
-    void add(const Candidate<BidirectionalMis>&) const {}
-    void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path, const RandomNumbers& d) const {
+    void arrived(const Subpath<Mis>& path, const Hit& hit) const {
+        if (splats.request.arrived) splats.request.arrived(path, hit);
+    }
+    void add(const Candidate<Mis>&) const {}
+    void at(const Vertex<Mis>& y, const Subpath<Mis>& path, const RandomNumbers& d) const {
         const auto& [ctx, request, light] = splats;
         if (ctx.rules.splat && request.splats && ctx.rules.wants(path.depth + 1, 1)) {
             DropWatch watch;
             ReplayDrop drop;
             const size_t before = light.splats.size();
-            ConnectCamera<kReplayFeatures, BidirectionalMis, ReplaySplats>{splats, watch.record()}.at(
-                ctx.view, ctx.rules, y, path, 0, d);
+            ConnectCamera<kReplayFeatures, Mis, ReplaySplats<Mis>>{splats, watch.record()}.at(ctx.view, ctx.rules, y,
+                                                                                              path, 0, d);
             if (watch.dropped("connect_camera", drop)) splats.invalid(drop, Strategy::make(path.depth + 1, 1));
             const Vec4f u = d.lens(path.depth);
             if (request.details && light.splats.size() > before)
@@ -91,8 +99,8 @@ struct ReplayLightSink {
 };
 
 /// The emission that the subpath begins with, in words.
-inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const EmissionSample& e,
-                           ReplaySubpath& subpath) {
+template <class Mis>
+void describe_start(const ReplayContext<Mis>& ctx, const EmissionSample& e, ReplaySubpath& subpath) {
     subpath.emitter = name_of(ctx.view.emitters[e.emitter].type);
     subpath.start = e.radiance;
     subpath.start_densities = {{"emitter", double(e.emitter)},
@@ -102,18 +110,19 @@ inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const Emi
                                {"cos_theta", e.cos_theta}};
 }
 
-inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, const ReplayLightRequest& request) {
-    ReplayLight light;
+template <class Mis>
+ReplayLight<Mis> replay_light(const ReplayContext<Mis>& ctx, const ReplayLightRequest<Mis>& request) {
+    ReplayLight<Mis> light;
     ReplaySubpath& subpath = light.subpath;
     subpath.side = Side::light;
     subpath.number = request.number;
     subpath.part = request.part;
     const RandomNumbers numbers = request.numbers();
-    const ReplaySplats splats = {ctx, request, light};
+    const ReplaySplats<Mis> splats = {ctx, request, light};
     DropWatch watch;
-    const LightStartSink<kReplayFeatures, BidirectionalMis, ReplaySplats> start = {splats, 0, numbers, watch.record()};
+    const LightStartSink<kReplayFeatures, Mis, ReplaySplats<Mis>> start = {splats, 0, numbers, watch.record()};
     EmissionSample e;
-    Subpath<BidirectionalMis> first{};  // depth 0
+    Subpath<Mis> first{};  // depth 0
     const bool starts = start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, numbers, start, e, first);
     if (request.details && first.depth > 0) describe_start(ctx, e, subpath);
     const bool valid = is_valid_radiance(first.throughput);
@@ -130,7 +139,7 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
                                                 : "the emitter sample carries no light";
         return light;
     }
-    replay_subpath(ctx, request.longest, first, kInfinity, ReplayLightSink{splats}, request.details, subpath);
+    replay_subpath(ctx, request.longest, first, kInfinity, ReplayLightSink<Mis>{splats}, request.details, subpath);
     return light;
 }
 

@@ -26,7 +26,7 @@ public:
     ReplayVertices& operator=(const ReplayVertices&) = delete;
 
     uint32_t size() const { return counter_.count; }
-    uint32_t owner(uint32_t place) const { return owners_[place]; }
+    void name_owner(uint32_t place, ReplayCandidate& c) const { c.light_subpath = owners_[place]; }
     /// `draws`: of an eye vertex; 0: those of the subpath one after the other, from the last on.
     LightVertexSource<BidirectionalMis> source(uint32_t draws) const { return {queue_, &last_, draws, false}; }
 
@@ -38,18 +38,11 @@ private:
     uint32_t last_ = kNone;
 };
 
-/// Number of the slot of a pixel within its tile (queues/wave.h).
-inline uint32_t slot_in_tile(uint32_t x, uint32_t y) {
-    uint32_t z = 0;
-    while (x_in_tile(z) != x % kTileSide || y_in_tile(z) != y % kTileSide) ++z;
-    return z;
-}
-
 /// The light subpaths of a sample of the tiles from `first_tile` on, in the order in which a wave runs them: round
 /// after round, depth after depth, slot after slot. `wave`: its shape; `request`: what they have in common.
 inline std::unique_ptr<ReplayVertices> replay_cache(const ReplayContext<BidirectionalMis>& ctx, Wave wave,
                                                     uint32_t first_tile, uint32_t per_tile, uint32_t rounds,
-                                                    ReplayLightRequest request) {
+                                                    ReplayLightRequest<BidirectionalMis> request) {
     WaveState state{};
     state.first_tile = first_tile;
     state.first_sample = request.sample;

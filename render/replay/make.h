@@ -7,12 +7,18 @@
 
 namespace ambilux {
 
+/// "path, light and bdpt"
+std::string listed(std::vector<std::string> names);
+
 struct BidirectionalMis;
+struct VcmPolicy;
 template <class Mis>
 struct BdptPolicyOf;
 
 std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
                                          const BdptPolicyOf<BidirectionalMis>& policy, ReplayPairing pairing);
+std::unique_ptr<Replay> make_merging_replay(const Scene& scene, const RenderSettings& settings,
+                                            const HostTracer& tracer, const VcmPolicy& policy);
 
 using MakeReplay = std::unique_ptr<Replay> (*)(const Scene&, const RenderSettings&, const HostTracer&);
 /// Null: there is no replay of it.

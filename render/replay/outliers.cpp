@@ -65,26 +65,26 @@ struct InvalidList {
     }
 };
 
-/// Looks through one sample, eye subpaths and light subpaths in turns, until there is enough of each stage that dropped
-/// something in it.
-void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene& scene, InvalidList& list,
-                   const volatile bool* interrupt) {
+/// Looks through one sample of `batch`, eye subpaths and light subpaths in turns, until there is enough of each stage
+/// that dropped something in it.
+void search_sample(const InvalidBatch& batch, uint32_t sample, const Replay& replay, const Scene& scene,
+                   InvalidList& list, const volatile bool* interrupt) {
     constexpr uint32_t kTogether = 1u << 15, kOfTask = 64;
     const uint32_t width = scene.sensor.crop_width;
     const uint64_t pixels = uint64_t(width) * scene.sensor.crop_height;
     const uint32_t eyes = uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths));
     const uint32_t lights = std::min(replay.light_subpaths(), kMostInvalidSubpaths);
     const std::map<std::string, uint32_t> earlier = list.of_stage;
-    InvalidSearch search{replay, sample.first, width, {}, {}};
+    InvalidSearch search{replay, sample, width, {}, {}};
     const auto share = [&](uint32_t first, uint32_t all, auto look) {
         if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, kOfTask);
         list.add(search.found);
     };
     for (uint32_t first = 0; first < std::max(eyes, lights) && !is_set(interrupt); first += kTogether) {
         share(first, eyes, [&](uint32_t pixel) { search.eye_subpath(pixel); });
-        if (list.has_enough(sample.by_stage, earlier)) return;
+        if (list.has_enough(batch.by_stage, earlier)) return;
         share(first, lights, [&](uint32_t number) { search.light_subpath(number); });
-        if (list.has_enough(sample.by_stage, earlier)) return;
+        if (list.has_enough(batch.by_stage, earlier)) return;
     }
 }
 
@@ -118,7 +118,8 @@ FoundInvalid find_invalid(InvalidWatch& watch, const Replay& replay, const Scene
             if (searched.size() == kMostInvalidSamples || list.has_enough(all) || is_set(interrupt))
                 return {std::move(list.kept), std::move(searched)};
             searched.push_back(sample.first);
-            search_sample(sample, replay, scene, list, interrupt);
+            for (uint32_t k = 0; k < sample.count; ++k)
+                search_sample(sample, sample.first + k, replay, scene, list, interrupt);
         }
     return {std::move(list.kept), std::move(searched)};
 }

@@ -1,11 +1,12 @@
 // Replays of methods without light subpaths.
 #pragma once
 
-#include <fmt/ranges.h>
+#include <fmt/format.h>
 
 #include "core/error.h"
 #include "integrators/registry.h"
 #include "render/replay/eye.h"
+#include "render/replay/make.h"
 
 namespace ambilux {
 
@@ -29,7 +30,7 @@ public:
             return v.light_subpaths && v.replay != ReplayPairing::no_replay;
         };
         throw Error(ExitCode::usage, fmt::format("--light-subpath: integrator {} has no light subpaths; {} have",
-                                                 integrator_, fmt::join(integrators_that(have), " and ")));
+                                                 integrator_, listed(integrators_that(have))));
     }
 
 private:

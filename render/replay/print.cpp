@@ -58,11 +58,15 @@ void print_vertex(const ReplayVertex& v, const ReplayFormat& format, std::string
     if (!v.end.empty()) out += fmt::format("       ends: {}\n", v.end);
 }
 
+/// Of a light subpath.
+std::string of_sample(uint32_t sample) { return sample == kNone ? "" : fmt::format(" of sample {}", sample); }
+
 void print_subpath(const ReplaySubpath& s, const ReplayFormat& format, std::string& out) {
     if (s.side == Side::eye)
         out += "eye subpath\n";
     else
-        out += fmt::format("light subpath {}{}\n", s.number, s.part ? fmt::format(", part {}", s.part) : "");
+        out += fmt::format("light subpath {}{}{}\n", s.number, of_sample(s.sample),
+                           s.part ? fmt::format(", part {}", s.part) : "");
     if (!s.emitter.empty())
         out += fmt::format("    0  starts on emitter of type {}, radiance {}; {}\n", s.emitter, text_of(s.start),
                            text_of(s.start_densities));
@@ -93,12 +97,16 @@ std::string fate_text(const ReplayCandidate& c) {
 void print_candidate(const ReplayCandidate& c, const ReplayFormat& format, std::string& out) {
     std::string ends = c.eye_depth ? fmt::format("eye vertex {}", c.eye_depth) : "";
     if (c.light_subpath != kNone)
-        ends += fmt::format("{}light subpath {} vertex {}", ends.empty() ? "" : ", ", c.light_subpath, c.light_depth);
-    out += fmt::format("  {:<8} {}, {}", strategy_text(c.strategy), c.kind, ends);
+        ends += fmt::format("{}light subpath {}{} vertex {}", ends.empty() ? "" : ", ", c.light_subpath,
+                            of_sample(c.light_sample), c.light_depth);
+    out += fmt::format("  {:<8} {}, {}", strategy_text({c.strategy, c.merged}), c.kind, ends);
     // What a stage drops before it has a weight is not kept.
     const bool kept = c.fate != ReplayFate::invalid || !is_zero(c.value);
     out += kept ? fmt::format(": value {}, ratio {:.6g}, weight {:.6g}\n", text_of(c.value), c.ratio, c.weight) : "\n";
     if (!c.densities.empty()) out += fmt::format("           {}\n", text_of(c.densities));
+    if (c.merged)
+        out += fmt::format("           eye vertex at {}, light vertex at {}\n", place_text(c.eye_p, format),
+                           place_text(c.light_p, format));
     if (c.tmax > 0)
         out += fmt::format("           shadow ray from {} along {}, {:.6g} long: {}\n", place_text(c.origin, format),
                            text_of(c.direction), c.tmax,
@@ -132,22 +140,26 @@ void add_shown(const std::vector<ReplayCandidate>& all, const ReplayFormat& form
 
 }  // namespace
 
-std::string strategy_text(Strategy strategy) { return fmt::format("s{}t{}", strategy.s(), strategy.t()); }
+std::string strategy_text(ReplayStrategy s) {
+    return fmt::format("s{}{}t{}", s.strategy.s(), s.merged ? "+" : "", s.strategy.t());
+}
 
-Strategy parse_strategy(const std::string& text) {
+ReplayStrategy parse_strategy(const std::string& text) {
     const char* const end = text.data() + text.size();
     const size_t at = text.find('t');
     uint32_t s = 0, t = 0;
     if (text[0] == 's' && at != std::string::npos) {
-        const auto first = std::from_chars(text.data() + 1, text.data() + at, s);
+        const bool merged = text[at - 1] == '+';
+        const char* const middle = text.data() + at - merged;
+        const auto first = std::from_chars(text.data() + 1, middle, s);
         const auto second = std::from_chars(text.data() + at + 1, end, t);
-        if (first.ec == std::errc() && first.ptr == text.data() + at && second.ec == std::errc() && second.ptr == end &&
-            t >= 1 && s + t >= 2 && s < 0x10000 && t < 0x10000)
-            return Strategy::make(s, t);
+        if (first.ec == std::errc() && first.ptr == middle && second.ec == std::errc() && second.ptr == end &&
+            (merged ? s >= 2 && t >= 2 : t >= 1 && s + t >= 2) && s < 0x10000 && t < 0x10000)
+            return {Strategy::make(s, t), merged};
     }
     throw Error(ExitCode::usage,
                 fmt::format("--strategy {}: write it as s1t3, one vertex from the light and three from the camera, "
-                            "with t at least 1 and s + t at least 2",
+                            "with t at least 1 and s + t at least 2; merges as s2+t3, with both at least 2",
                             text));
 }
 

@@ -10,21 +10,30 @@
 
 namespace ambilux {
 
-/// "s1t3": one vertex from the light, three from the camera.
-std::string strategy_text(Strategy strategy);
-/// Throws Error(usage) unless `text` is of this form.
-Strategy parse_strategy(const std::string& text);
+/// Strategy (s,t), or merges of subpaths of s and t vertices.
+struct ReplayStrategy {
+    Strategy strategy;
+    bool merged;
+
+    ReplayStrategy(Strategy s, bool m = false) : strategy(s), merged(m) {}
+};
+/// "s1t3": one vertex from the light, three from the camera. "s2+t3": subpaths of two and three that merge.
+std::string strategy_text(ReplayStrategy strategy);
+/// Throws Error(usage) unless `text` is of one of these forms.
+ReplayStrategy parse_strategy(const std::string& text);
 
 /// What is printed of a replay, and where its scene lies.
 struct ReplayFormat {
-    std::optional<Strategy> only;    ///< contributions of this strategy, if it is given
-    std::array<double, 3> origin{};  ///< Scene::origin: positions are printed in coordinates of the file
+    std::optional<ReplayStrategy> only;  ///< contributions of this strategy, if it is given
+    std::array<double, 3> origin{};      ///< Scene::origin: positions are printed in coordinates of the file
 
     bool moved() const { return origin != std::array<double, 3>{}; }
     std::array<double, 3> in_file(Vec3f p) const {
         return {origin[0] + double(p.x), origin[1] + double(p.y), origin[2] + double(p.z)};
     }
-    bool shows(const ReplayCandidate& c) const { return !only || c.strategy.code == only->code; }
+    bool shows(const ReplayCandidate& c) const {
+        return !only || (c.strategy.code == only->strategy.code && c.merged == only->merged);
+    }
 };
 
 std::string replay_text(const ReplaySample& sample, const ReplayFormat& format);

@@ -69,10 +69,12 @@ struct ReplayDrop {
 
 /// Light that a strategy found, on its way to a pixel.
 struct ReplayCandidate {
-    const char* kind = "";  ///< hit, environment, next event, connection, camera
+    const char* kind = "";  ///< hit, environment, next event, connection, camera, merge
     Strategy strategy{};
+    bool merged = false;                      ///< both subpaths end at one vertex of the path, which s and t both count
     uint32_t eye_depth = 0, light_depth = 0;  ///< segments of the subpaths that it joins
     uint32_t light_subpath = kNone;           ///< number of the light subpath (ReplayKey::light); kNone: there is none
+    uint32_t light_sample = kNone;            ///< its sample, where those of an iteration share light subpaths
     Rgb value{};                              ///< unweighted
     float ratio = 0, weight = 1;              ///< weight = 1 / (1 + ratio)
     std::vector<ReplayNumber> densities;
@@ -80,9 +82,13 @@ struct ReplayCandidate {
     float tmax = 0;               ///< of the shadow ray; 0: there is none
     Vec2f film{};                 ///< t = 1: where it lands, in pixels of the full film
     float filter = 1;             ///< t = 1: value of the pixel's filter there
+    Vec3f eye_p{}, light_p{};     ///< of a merge: the vertices
     Rgb contribution{};           ///< what arrives at the pixel
     ReplayFate fate = ReplayFate::zero;
     ReplayDrop drop;
+
+    /// Of the path.
+    uint32_t segments() const { return strategy.segments() - merged; }
 };
 
 /// A subpath and what it met. A light subpath has the number round · pixels + pixel of the slot that it started in
@@ -90,7 +96,8 @@ struct ReplayCandidate {
 struct ReplaySubpath {
     Side side = Side::eye;
     uint32_t number = 0, part = 0;
-    Rgb start{};  ///< light: radiance of the emitter sample
+    uint32_t sample = kNone;  ///< as ReplayCandidate::light_sample
+    Rgb start{};              ///< light: radiance of the emitter sample
     std::string emitter;
     std::vector<ReplayNumber> start_densities;
     std::vector<ReplayVertex> vertices;

@@ -8,16 +8,12 @@
 #include "render/replay/make.h"
 
 namespace ambilux {
-namespace {
 
-/// "path, light and bdpt"
 std::string listed(std::vector<std::string> names) {
     const std::string last = std::move(names.back());
     names.pop_back();
     return names.empty() ? last : fmt::format("{} and {}", fmt::join(names, ", "), last);
 }
-
-}  // namespace
 
 void check_replay(const RenderSettings& settings) {
     const Variant& variant = variant_of(settings);

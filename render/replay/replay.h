@@ -26,6 +26,8 @@ public:
 
     virtual ~Replay() = default;
     virtual ReplaySample sample(const ReplayRequest& request) const = 0;
+    /// Samples of every pixel that share light subpaths: of an iteration.
+    virtual uint32_t iteration_samples() const { return 1; }
     /// Light subpaths of one sample of all pixels; 0 where there are none.
     virtual uint32_t light_subpaths() const { return 0; }
     /// Numbers below light_subpaths() have gaps where there is no whole number of light subpaths per pixel.

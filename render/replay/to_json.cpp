@@ -86,6 +86,8 @@ json to_json(const ReplayCandidate& c, const ReplayFormat& format) {
               {"fate", name_of(c.fate)},
               {"dropped", to_json(c.drop)},
               {"contribution", triple(c.contribution)}};
+    if (c.light_sample != kNone) j["light_sample"] = c.light_sample;
+    if (c.merged) j["merge"] = {{"eye_vertex", place(c.eye_p, format)}, {"light_vertex", place(c.light_p, format)}};
     if (c.tmax > 0)
         j["shadow_ray"] = {{"origin", place(c.origin, format)},
                            {"direction", triple(c.direction)},
@@ -107,6 +109,7 @@ json to_json(const ReplaySubpath& s, const ReplayFormat& format) {
               {"radiance", triple(s.start)},
               {"densities", to_json(s.start_densities)},
               {"end", s.end.empty() ? json(nullptr) : json(s.end)}});
+    if (s.sample != kNone) j["sample"] = s.sample;
     return j;
 }
 

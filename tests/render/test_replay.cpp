@@ -3,6 +3,7 @@
 // A replay brings the sample that a render made, by every integrator and variant that has one: bit by bit where the
 // render's kernels hold all features as those of replays do, within rounding where they are specialised.
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,10 +17,11 @@
 namespace ambilux {
 namespace {
 
-/// The image of one sample.
+/// The image of one sample, or of the iteration that begins with it.
 FilmMoments one_sample(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
-    REQUIRE(renderer->render(sample, 1) == 1);
+    const uint32_t together = renderer->iteration_samples();
+    REQUIRE(renderer->render(sample, together) == together);
     CHECK(renderer->stats().invalid.total() == 0);
     return renderer->film();
 }
@@ -48,7 +50,12 @@ uint32_t check_samples(const Scene& scene, const RenderSettings& settings, uint3
     const std::unique_ptr<Replay> replay = make_replay(scene, settings, accels);
     uint32_t lit = 0;
     for (const uint32_t pixel : pixels_of(film, step)) {
-        const ReplaySample r = replay->sample({pixel % film.width, pixel / film.width, sample, {}, true, true});
+        ReplayRequest request = {pixel % film.width, pixel / film.width, sample, {}, true, true};
+        ReplaySample r = replay->sample(request);
+        while (++request.sample < sample + replay->iteration_samples()) {
+            const ReplaySample other = replay->sample(request);
+            for (uint32_t c = 0; c < 3; ++c) r.total[c] += other.total[c];
+        }
         CAPTURE(pixel, r.total[0], r.total[1], r.total[2], film.sum[pixel * 3], r.eye_sum.x, r.splat_sum[0]);
         CHECK(r.complete);
         bool equal = true;
@@ -96,6 +103,15 @@ const ReplayConfig kBidirectional[] = {
     {"bdpt", "megakernel", {}},
     {"bdpt", "megakernel", {{"heuristic", "power"}, {"rr_depth", "1"}}},
 };
+const ReplayConfig kMerging[] = {
+    {"vcm", "wavefront", {}},
+    {"vcm", "wavefront", {{"merge_samples", "4"}, {"light_paths", "1.5"}}},
+    {"vcm", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"cull", "0.3"}, {"merge_first", "false"}}},
+    {"bpm", "wavefront", {}},
+    {"ppm", "wavefront", {}},
+    {"sppm", "wavefront", {{"merge_radius", "0.05"}}},
+    {"pm", "wavefront", {{"merge_samples", "4"}}},
+};
 
 }  // namespace
 
@@ -121,6 +137,19 @@ TEST_CASE("A replayed sample of light tracing and of bdpt is the render's, bit b
                 RenderSettings settings = settings_of(scene, c);
                 settings.specialise = specialise;
                 CHECK(check_samples(scene, settings, 3, 97) > 0);
+            }
+    }
+}
+
+TEST_CASE("A replayed sample of what merges is the render's by any number of threads, bit by bit with full kernels") {
+    for (const char* name : {"cornell", "glass", "lights", "textured"}) {
+        const Scene scene = project_scene(name, 37, 29);
+        for (const ReplayConfig& c : kMerging)
+            for (const int threads : {1, 2, 7}) {
+                CAPTURE(name, text_of(c), threads);
+                RenderSettings settings = settings_of(scene, c);
+                settings.specialise = threads == 2;
+                tbb::task_arena(threads).execute([&] { CHECK(check_samples(scene, settings, 4, 97) > 0); });
             }
     }
 }

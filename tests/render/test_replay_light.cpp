@@ -375,7 +375,8 @@ TEST_CASE("Light subpaths have numbers round by round, with gaps where there is 
     const Replayed path(cornell(), {"path", "wavefront", {}});
     CHECK(path.replay->light_subpaths() == 0);
     CHECK_FALSE(path.replay->has_light_subpath(0));
-    CHECK(asked(path, 0) == "--light-subpath: integrator path has no light subpaths; light and bdpt have");
+    CHECK(asked(path, 0) ==
+          "--light-subpath: integrator path has no light subpaths; light, bdpt, vcm, bpm, ppm, sppm and pm have");
 }
 
 TEST_CASE(
@@ -383,7 +384,7 @@ TEST_CASE(
     const Scene scene = cornell();
     const auto refused = [&](const ReplayConfig& c) { return refusal([&] { check_replay(settings_of(scene, c)); }); };
     CHECK(refused({"toy", "wavefront", {}}) ==
-          "integrator toy: there is no replay of it; path, light and bdpt have one");
+          "integrator toy: there is no replay of it; path, light, bdpt, vcm, bpm, ppm, sppm and pm have one");
     CHECK(refused({"bdpt", "learned", {}}) ==
           "variant learned: there is no replay of it; wavefront, lvc, streaming and megakernel have one");
     CHECK(refused({"bdpt", "wavefront", {{"bdpt.auto", "true"}}}) ==

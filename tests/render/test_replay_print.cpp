@@ -349,11 +349,19 @@ TEST_CASE("Strategies are read as they are written, and nothing else is one") {
     for (const auto& [s, t] : {std::pair{0u, 2u}, {1u, 1u}, {1u, 3u}, {12u, 34u}, {0xffffu, 1u}, {0u, 0xffffu}}) {
         const std::string text = "s" + std::to_string(s) + "t" + std::to_string(t);
         CHECK(strategy_text(Strategy::make(s, t)) == text);
-        CHECK(parse_strategy(text).code == Strategy::make(s, t).code);
+        CHECK(parse_strategy(text).strategy.code == Strategy::make(s, t).code);
+        CHECK_FALSE(parse_strategy(text).merged);
+    }
+    for (const auto& [s, t] : {std::pair{2u, 2u}, {12u, 34u}}) {
+        const std::string text = "s" + std::to_string(s) + "+t" + std::to_string(t);
+        CHECK(strategy_text({Strategy::make(s, t), true}) == text);
+        CHECK(parse_strategy(text).strategy.code == Strategy::make(s, t).code);
+        CHECK(parse_strategy(text).merged);
     }
     for (const char* text :
-         {"",      "s1",    "st",    "s1t",    "st3",   "t1s3", "x1t3", "s1x3",     "s1t3 ",    "s1 t3",
-          " s1t3", "s-1t3", "s1t-3", "s1t3t4", "s1xt3", "s2t0", "s0t1", "s65536t1", "s1t65536", "s4294967297t2"}) {
+         {"",      "s1",    "st",     "s1t",    "st3",   "t1s3", "x1t3", "s1x3",     "s1t3 ",    "s1 t3",
+          " s1t3", "s-1t3", "s1t-3",  "s1t3t4", "s1xt3", "s2t0", "s0t1", "s65536t1", "s1t65536", "s4294967297t2",
+          "s1+t2", "s2+t1", "s2++t2", "s+t2",   "s2+2"}) {
         CAPTURE(text);
         try {
             (void)parse_strategy(text);
@@ -362,7 +370,7 @@ TEST_CASE("Strategies are read as they are written, and nothing else is one") {
             CHECK(e.code == ExitCode::usage);
             CHECK(e.what() == "--strategy " + std::string(text) +
                                   ": write it as s1t3, one vertex from the light and three from the camera, with t at "
-                                  "least 1 and s + t at least 2");
+                                  "least 1 and s + t at least 2; merges as s2+t3, with both at least 2");
         }
     }
 }

@@ -92,7 +92,7 @@ struct VcmIntegrator {
                            p.waves.light_rounds(),
                            state.table_bits,
                            p.rules.connect,
-                           p.rules.mis.competes() || !p.rules.next_event,
+                           p.keeps_first(),
                            record(keep[k])};
                 order[k] = {scene, hits[k], {m.queries, hits[k].counter}, record(order[k])};
                 merge[k] = {scene, parts.wave, p.rules, hits[k], state, two_sides.eye.accumulate, record(merge[k])};

@@ -7,6 +7,14 @@
 
 namespace ambilux {
 
+/// What one light vertex brings.
+struct MergeFound {
+    Rgb value;  ///< flux times BSDF
+    float cosine, ratio;
+
+    AMBILUX_HD Rgb times(float weight) const { return value * (weight / cosine); }
+};
+
 /// What all merges of an eye vertex bring.
 template <Features F>
 struct MergeSum {
@@ -14,32 +22,22 @@ struct MergeSum {
     const Rules<MergingMis>& rules;
     const Vertex<MergingMis>& z;
     const Subpath<MergingMis>& path;  ///< that ends at z
-    uint32_t pixel;
-    const Accumulate& samples;
     Rgb sum = {0.0f, 0.0f, 0.0f};
 
-    /// Flux over an area is radiance times the cosine to that area.
-    AMBILUX_HD void add(const MergeVertex& y) {
+    AMBILUX_HD void add(const MergeFound& m) { sum += m.times(mis_weight(m.ratio)); }
+    /// False if `y` brings nothing. Flux over an area is radiance times the cosine to that area.
+    AMBILUX_HD bool find(const MergeVertex& y, MergeFound& m) const {
         const Vec3f d = octahedral_decode(y.d);
-        const float cosine = fabsf(dot(z.point.ng, d));
-        if (path.depth + y.front.depth > rules.max_depth || !(cosine > 0.0f)) return;
+        m.cosine = fabsf(dot(z.point.ng, d));
+        if (path.depth + y.front.depth > rules.max_depth || !(m.cosine > 0.0f)) return false;
         const BsdfValue f = rules.directions.template evaluate<F>(z, -d, TransportMode::radiance);
-        if (is_zero(f.value)) return;
-        const float ratio = rules.mis.merge_ratio(y.sums(), y.front.depth == 1, z.sums, z.first, f);
-        const float weight = mis_weight(ratio);
-        sum += f.value * y.flux * (weight / cosine);
-        if (samples.strategies.sums) gather(y, f.value * y.flux * (1.0f / cosine), weight);
+        if (is_zero(f.value)) return false;
+        m.ratio = rules.mis.merge_ratio(y.sums(), y.front.depth == 1, z.sums, z.first, f);
+        m.value = f.value * y.flux;
+        return true;
     }
-    /// What is added to the sample.
-    AMBILUX_HD Rgb light(Rgb of_vertices) const { return path.throughput * of_vertices * (1.0f / rules.mis.eta()); }
-
-private:
-    /// For the image of this strategy.
-    AMBILUX_HD void gather(const MergeVertex& y, Rgb value, float weight) const {
-        const Wave& wave = samples.wave;
-        samples.strategies.add_merge(y.front.depth + 1, path.depth + 1, wave.width * wave.height, pixel, light(value),
-                                     light(value * weight));
-    }
+    /// What `found` by light vertices adds to the sample.
+    AMBILUX_HD Rgb light(Rgb found) const { return path.throughput * found * (1.0f / rules.mis.eta()); }
 };
 
 template <Features F>
@@ -61,15 +59,27 @@ struct Merge {
         at_mergeable<F>(scene, rules, Side::eye, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& z) {
             if (path.depth == 1 && !rules.mis.merges_first) return;
             const float radius = rules.mis.now->radius;
-            const uint32_t pixel = wave.locate(hit.ray.path).pixel;
-            MergeSum<F> sum = {scene, rules, z, path, pixel, samples};
+            MergeSum<F> sum = {scene, rules, z, path};
             NearVertices near = {state, MergeGrid::of(scene, radius), z.point.p, radius};
-            for (uint32_t k; (k = near.next()) != kNone;) sum.add(state.sorted.load(k));
+            for (uint32_t k; (k = near.next()) != kNone;) {
+                const MergeVertex y = state.sorted.load(k);
+                MergeFound m;
+                if (!sum.find(y, m)) continue;
+                sum.add(m);
+                if (samples.strategies.sums) remember(sum, m, y.front.depth + 1, path.depth + 1, hit.ray.path);
+            }
             const Rgb light = sum.light(sum.sum);
             Accumulate gathered = samples;
             gathered.strategies = {};
             if (!is_zero(light)) gathered.push(Contribution{light, hit.ray.path});
         });
+    }
+
+private:
+    /// For the image of this strategy.
+    AMBILUX_HD void remember(const MergeSum<F>& sum, const MergeFound& m, uint32_t s, uint32_t t, uint32_t slot) const {
+        samples.strategies.add_merge(s, t, wave.width * wave.height, wave.locate(slot).pixel, sum.light(m.times(1.0f)),
+                                     sum.light(m.times(mis_weight(m.ratio))));
     }
 };
 

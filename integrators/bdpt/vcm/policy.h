@@ -13,6 +13,8 @@ struct VcmPolicy : BdptPolicyOf<MergingMis> {
     float first_radius;     ///< of the first iteration
     uint32_t vertex_lanes;  ///< of a light vertex, as kernels of these features use them
 
+    /// First vertices of light subpaths merge; else next event estimation finds what arrives there, beams excepted.
+    bool keeps_first() const { return rules.mis.competes() || !rules.next_event; }
     /// Light subpaths of an iteration.
     float subpaths() const { return rules.mis.light_subpaths * float(vcm.samples); }
 

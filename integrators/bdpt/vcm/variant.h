@@ -23,7 +23,8 @@ protected:
                 .culls = shadow_rays,
                 .sorts = false,
                 .compacts = false,
-                .merges = merges};
+                .merges = merges,
+                .replay = ReplayPairing::iteration};
     }
 };
 
