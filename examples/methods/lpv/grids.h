@@ -9,6 +9,10 @@ namespace ambilux::lpv {
 
 using Intensity = Harmonics<Rgb>;  ///< of a cell, per solid angle
 
+struct Cell {
+    int32_t at[3];
+};
+
 /// Number of a site among `along`^3.
 AMBILUX_HD uint32_t site(uint32_t along, uint32_t x, uint32_t y, uint32_t z) { return (z * along + y) * along + x; }
 
@@ -24,6 +28,10 @@ struct Grid {
         const float most = float(along);
         const bool inside = p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x < most && p.y < most && p.z < most;
         return inside ? site(along, uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)) : kNone;
+    }
+    AMBILUX_HD Cell cell_of(uint32_t i) const {
+        const uint32_t n = resolution;
+        return {{int32_t(i % n), int32_t(i / n % n), int32_t(i / (n * n))}};
     }
     AMBILUX_HD Vec3f in_cells(Vec3f p) const { return (p - low) * (1.0f / cell); }
     /// 1 inside, 0 from half a cell before the border on, where cells on all sides are missing; between, over one cell.
@@ -53,6 +61,16 @@ struct Cascades {
     uint32_t count;
 
     static Cascades plan(const Scene& scene, const Settings& settings);
+    /// What the next larger grid tells of a cell of grid `c`, or of one beside it. `total`: of all grids. Radiance is
+    /// the same, so that intensities are as areas of faces.
+    AMBILUX_HD Intensity from_larger(const Intensity* total, uint32_t c, const Cell& cell) const {
+        const Grid &grid = grids[c], &larger = grids[c - 1];
+        const Vec3f middle = Vec3f{float(cell.at[0]), float(cell.at[1]), float(cell.at[2])} + splat(0.5f);
+        Intensity light = {};
+        light.add(splat(sqr(grid.cell / larger.cell)),
+                  larger.interpolate(total + (c - 1) * larger.cells(), grid.low + middle * grid.cell));
+        return light;
+    }
 };
 
 }  // namespace ambilux::lpv

@@ -80,19 +80,24 @@ AMBILUX_HD void for_lights(const State& state, uint32_t count, uint32_t site, Us
         use(state.lights[state.order.values[1][i]]);
 }
 
-/// Light of a cell before the first step.
+/// What virtual lights send from a cell, and its light before the first step: that, or what the larger grid holds
+/// there, which further steps refine.
 struct Inject {
     static constexpr const char* kName = "inject";
 
+    Cascades cascades;
     State state;
-    uint32_t count, cells, cascade;
+    uint32_t count, cascade;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
+        const uint32_t place = cascade * cascades.grids[cascade].cells() + i;
         Intensity sum = {};
-        for_lights(state, count, cascade * cells + i,
+        for_lights(state, count, place,
                    [&](const VirtualLight& light) { sum.add_cosine(light.flux * kInvPi, light.n); });
-        state.flow[0][i] = state.total[cascade * cells + i] = sum;
+        state.injected[i] = sum;
+        if (cascade > 0) sum = cascades.from_larger(state.total, cascade, cascades.grids[cascade].cell_of(i));
+        state.light[0][i] = state.total[place] = sum;
     }
 };
 

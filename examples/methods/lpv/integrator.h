@@ -23,7 +23,7 @@ struct LpvIntegrator {
     using Eye = PathIntegrator<F, Tracer, kFusion, NextEvent, NoSettings, Mis>;
 
     struct Policy : BdptPolicyOf<Mis> {
-        lpv::Settings lpv;
+        lpv::Settings volumes;
         lpv::Cascades cascades;
         uint32_t light_subpaths;  ///< of an iteration; 0: they find nothing
     };
@@ -32,11 +32,11 @@ struct LpvIntegrator {
         Policy p{plan_bdpt<Mis>(scene, settings), lpv::Settings::plan(settings), {}, 0};
         p.rules.mis.merges = Merges::first;
         p.rules.directions.deltas_only = true;
-        p.cascades = lpv::Cascades::plan(scene, p.lpv);
+        p.cascades = lpv::Cascades::plan(scene, p.volumes);
         p.waves.keeps_light_vertices = false;
-        p.waves.iteration_samples = p.lpv.iteration_samples;
+        p.waves.iteration_samples = p.volumes.iteration_samples;
         p.waves.multi_bounce_below = 0;  // gathering is a stage of its own
-        if (!scene.emitters.empty() && p.rules.max_depth >= 3) p.light_subpaths = p.lpv.lights(scene);
+        if (!scene.emitters.empty() && p.rules.max_depth >= 3) p.light_subpaths = p.volumes.lights(scene);
         return p;
     }
     static std::vector<std::string> skipped(const Scene&, const Policy& p) {
@@ -74,8 +74,8 @@ struct LpvIntegrator {
             const SceneView& scene = parts.scene;
             const Wave& wave = parts.wave;
             const auto& q = m.subpaths;
-            const uint32_t pairs = p.light_subpaths * p.cascades.count, cells = p.cascades.grids[0].cells();
-            const float subpaths = p.rules.mis.light_subpaths * float(p.lpv.iteration_samples);
+            const uint32_t pairs = p.light_subpaths * p.cascades.count;
+            const float subpaths = p.rules.mis.light_subpaths * float(p.volumes.iteration_samples);
             generate_light = {scene, wave, p.rules, q.rays[0], {}, nullptr, record(generate_light), kTilePixels};
             extend_light = {scene,
                             parts.tracer,
@@ -84,12 +84,12 @@ struct LpvIntegrator {
                             q.rays[0],
                             q.hits[0],
                             parts.layout.record(extend_light.kLightName)};
-            leave = {scene, wave, p.rules, q.hits[0], all.lights, p.lpv.iteration_samples, subpaths, record(leave)};
+            leave = {scene, wave, p.rules, q.hits[0], all.lights, p.volumes.iteration_samples, subpaths, record(leave)};
             find = {wave, p.cascades, all, p.light_subpaths, false, record(find)};
             sort = parts.layout.record("sort_lights");
             block = {all, pairs, record(block)};
-            inject = {all, pairs, cells, 0, record(inject)};
-            propagate = {p.cascades, all, p.lpv.occlusion, 0, 0, record(propagate)};
+            inject = {p.cascades, all, pairs, 0, record(inject)};
+            propagate = {p.cascades, all, p.volumes.occlusion, 0, 0, record(propagate)};
             for (int k = 0; k < 2; ++k)
                 gather[k] = {
                     scene, wave, p.rules, p.cascades, q.hits[k], all.total, eye.eye.accumulate, record(gather[k])};
@@ -125,7 +125,7 @@ private:
     static void build(Executor& exec, const Stages& s) {
         const lpv::Cascades& cascades = s.policy.cascades;
         const uint32_t cells = cascades.grids[0].cells();
-        if (s.policy.lpv.occlusion > 0.0f) {
+        if (s.policy.volumes.occlusion > 0.0f) {
             sort_lights(exec, s, true);
             exec.for_each(s.block, cascades.count * cascades.grids[0].corners());
         }
@@ -135,7 +135,7 @@ private:
             lpv::Propagate propagate = s.propagate;
             inject.cascade = propagate.cascade = c;
             exec.for_each(inject, cells);
-            for (propagate.step = 0; propagate.step < s.policy.lpv.steps; ++propagate.step)
+            for (propagate.step = 0; propagate.step < s.policy.volumes.steps; ++propagate.step)
                 exec.for_each(propagate, cells);
         }
     }

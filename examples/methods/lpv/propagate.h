@@ -14,8 +14,9 @@ constexpr float kSideAlong = 0.894427191f, kSideAcross = 0.447213595f;
 
 /// The flux that a neighbour's intensity, along the direction to its middle, sends to each face becomes the cosine lobe
 /// of that flux about the normal of the face. Negative intensities of the two bands stay, so that flux is conserved.
-/// The first step of a finer grid has as neighbours beyond its border what the larger one holds there, the sum of all
-/// its steps: light from outside arrives. (The paper's grids know nothing of each other.)
+/// Each step adds what was injected, so that the light of a cell is the sum over the steps of the paper. Beyond the
+/// border of a finer grid lies the light of the larger one. (The paper's grids know nothing of each other, so that what
+/// lies outside of one does not light it.)
 struct Propagate {
     static constexpr const char* kName = "propagate";
 
@@ -26,11 +27,11 @@ struct Propagate {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const uint32_t n = cascades.grids[cascade].resolution;
-        const int32_t cell[3] = {int32_t(i % n), int32_t(i / n % n), int32_t(i / (n * n))};
+        const Grid& grid = cascades.grids[cascade];
+        const Cell cell = grid.cell_of(i);
         Intensity sum = {};  // of fluxes, times the axes that their lobes are about
         for (int axis = 0; axis < 3; ++axis)
-            for (const float sign : {-1.0f, 1.0f}) {
+            for (float sign = -1.0f; sign <= 1.0f; sign += 2.0f) {
                 Intensity from;
                 if (!neighbour(cell, axis, sign, from)) continue;
                 const Harmonics<float> blocked = blocking(cell, axis, sign);
@@ -43,7 +44,7 @@ struct Propagate {
                 d[axis] = sign * kSideAlong;
                 for (int across = 0; across < 3; ++across) {
                     if (across == axis) continue;
-                    for (const float side : {-1.0f, 1.0f}) {
+                    for (float side = -1.0f; side <= 1.0f; side += 2.0f) {
                         d[across] = side * kSideAcross;
                         const Rgb flux = (all + along * kSideAlong + from.c1[across] * (d[across] * kBand1)) *
                                          (kSideAngle * passing(blocked, d));
@@ -55,35 +56,30 @@ struct Propagate {
             }
         sum.c0 *= kCosine0 * kInvPi;
         for (Rgb& c : sum.c1) c *= kCosine1 * kInvPi;
-        state.flow[1 - (step & 1)][i] = sum;
-        state.total[cascade * n * n * n + i].add(splat(1.0f), sum);
+        sum.add(splat(1.0f), state.injected[i]);
+        state.light[1 - (step & 1)][i] = state.total[cascade * grid.cells() + i] = sum;
     }
 
 private:
     /// Intensity of the cell that a step along `axis` to `sign` leaves to reach `cell`. False if there is none.
-    AMBILUX_HD bool neighbour(const int32_t (&cell)[3], int axis, float sign, Intensity& from) const {
-        const Grid& grid = cascades.grids[cascade];
-        int32_t at[3] = {cell[0], cell[1], cell[2]};
-        at[axis] -= sign > 0.0f ? 1 : -1;
-        if (at[axis] >= 0 && at[axis] < int32_t(grid.resolution)) {
-            from = state.flow[step & 1][site(grid.resolution, uint32_t(at[0]), uint32_t(at[1]), uint32_t(at[2]))];
-            return true;
-        }
-        if (cascade == 0 || step > 0) return false;
-        const Vec3f middle = Vec3f{float(at[0]), float(at[1]), float(at[2])} + splat(0.5f);
-        const Grid& outer = cascades.grids[cascade - 1];
-        from = {};
-        from.add(splat(sqr(grid.cell / outer.cell)),
-                 outer.interpolate(state.total + (cascade - 1) * outer.cells(), grid.low + middle * grid.cell));
+    AMBILUX_HD bool neighbour(Cell cell, int axis, float sign, Intensity& from) const {
+        const uint32_t n = cascades.grids[cascade].resolution;
+        const int32_t x = cell.at[axis] -= sign > 0.0f ? 1 : -1;
+        if (x >= 0 && x < int32_t(n))
+            from = state.light[step & 1][site(n, uint32_t(cell.at[0]), uint32_t(cell.at[1]), uint32_t(cell.at[2]))];
+        else if (cascade > 0)
+            from = cascades.from_larger(state.total, cascade, cell);
+        else
+            return false;
         return true;
     }
     /// Mean over the corners of the face through which that step leads.
-    AMBILUX_HD Harmonics<float> blocking(const int32_t (&cell)[3], int axis, float sign) const {
+    AMBILUX_HD Harmonics<float> blocking(const Cell& cell, int axis, float sign) const {
         Harmonics<float> mean = {};
         if (!(occlusion > 0.0f)) return mean;
         const Grid& grid = cascades.grids[cascade];
         for (uint32_t k = 0; k < 4; ++k) {
-            uint32_t at[3] = {uint32_t(cell[0]), uint32_t(cell[1]), uint32_t(cell[2])};
+            uint32_t at[3] = {uint32_t(cell.at[0]), uint32_t(cell.at[1]), uint32_t(cell.at[2])};
             at[axis] += sign < 0.0f;
             at[(axis + 1) % 3] += k & 1;
             at[(axis + 2) % 3] += k >> 1;

@@ -19,8 +19,10 @@ std::vector<Declaration<lpv::Settings>> LpvVariant::settings() {
                        "edge of the largest grid, over that of the cube around all surfaces"),
             Of::number("lpv_occlusion", &S::occlusion, 0.0f, 1.0f,
                        "share of the flux towards surfaces that they hold back on its way; 0: none"),
-            Of::number("lpv_samples", &S::iteration_samples, 1u, 1024u,
-                       "samples of every pixel in one iteration: they share virtual lights and grids")};
+            Of::number(
+                "lpv_samples", &S::iteration_samples, 1u, 1024u,
+                "samples of every pixel in one iteration: they share virtual lights and grids, and surfaces that few "
+                "lights show hold little back")};
 }
 
 std::string LpvVariant::bias(const RenderSettings& settings) {
@@ -37,11 +39,10 @@ lpv::Settings lpv::Settings::plan(const RenderSettings& settings) {
 uint32_t lpv::Settings::lights(const Scene& scene) const {
     const uint64_t lights = uint64_t(scene.sensor.crop_width) * scene.sensor.crop_height * iteration_samples;
     if (lights * cascades <= 0xffffffffull) return uint32_t(lights);
-    throw Error(
-        ExitCode::usage,
-        fmt::format("lpv_samples={}: virtual lights of an iteration are numbered up to 4294967295 in all grids, "
-                    "and a film of {}x{} has {}; choose fewer samples or grids",
-                    iteration_samples, scene.sensor.crop_width, scene.sensor.crop_height, lights * cascades));
+    throw Error(ExitCode::usage,
+                fmt::format("lpv_samples={}: an iteration would have {} virtual lights in {} grids, and "
+                            "4294967295 can be numbered; choose fewer samples or grids",
+                            iteration_samples, lights, cascades));
 }
 
 }  // namespace ambilux

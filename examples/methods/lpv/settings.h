@@ -13,10 +13,10 @@ namespace lpv {
 constexpr uint32_t kMostCascades = 6;
 
 struct Settings {
-    uint32_t cascades = 3;     ///< nested grids, each with half the edge of the one around it
-    uint32_t resolution = 32;  ///< cells of a grid along an axis
-    uint32_t steps = 32;       ///< of propagation
-    float size = 1.0f;         ///< edge of the largest grid, over that of the cube around all surfaces
+    uint32_t cascades = 3;           ///< nested grids, each with half the edge of the one around it
+    uint32_t resolution = 32;        ///< cells of a grid along an axis
+    uint32_t steps = 32;             ///< of propagation
+    float size = 1.0f;               ///< edge of the largest grid, over that of the cube around all surfaces
     float occlusion = 1.0f;          ///< share of the blocked flux that is held back; 0: nothing blocks
     uint32_t iteration_samples = 1;  ///< samples of every pixel that share their virtual lights
 

@@ -21,8 +21,9 @@ struct State {
 
     VirtualLight* lights;        ///< by number of the light subpath in the iteration
     SortMemory<uint32_t> order;  ///< sites of all grids, from 1 on, and the lights there; 0: outside
-    Intensity* flow[2];          ///< of one grid, before and after a step
-    Intensity* total;            ///< of all grids, the sum over steps
+    Intensity* injected;         ///< of one grid
+    Intensity* light[2];         ///< of one grid, before and after a step
+    Intensity* total;            ///< of all grids, after the last step
     Harmonics<float>* blocking;  ///< of all grids, at corners of cells: share of the flux in a direction
 
     template <class Policy>
@@ -32,7 +33,8 @@ struct State {
         State s;
         s.lights = layout.allocate<VirtualLight>(lights);
         s.order = SortMemory<uint32_t>::lay_out(layout, lights * grids, size.primitives);
-        for (Intensity*& flow : s.flow) flow = layout.allocate<Intensity>(grids ? cells : 0);
+        for (Intensity** one : {&s.injected, &s.light[0], &s.light[1]})
+            *one = layout.allocate<Intensity>(grids ? cells : 0);
         s.total = layout.allocate<Intensity>(uint64_t(grids) * cells);
         s.blocking = layout.allocate<Harmonics<float>>(uint64_t(grids) * p.cascades.grids[0].corners());
         return s;
