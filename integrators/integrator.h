@@ -33,14 +33,15 @@ struct WavePolicy {
     uint32_t most_paths = ~0u;             ///< of a wave, as items can number them
     uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
     uint32_t iteration_samples = 1;        ///< of every pixel in one iteration
-    bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
+    uint64_t iteration_light_subpaths = ~0ull;  ///< of an iteration, at most: those beyond are not begun
+    bool keeps_light_vertices = false;          ///< queues of light vertices or splats hold those of a whole wave
 
     uint32_t strategy_images() const { return StrategyFilm::images(strategy_depth, strategy_merges); }
     /// Most light subpaths of a slot.
     uint32_t light_rounds() const { return (light_subpaths_per_tile + kTilePixels - 1) / kTilePixels; }
     /// Light subpaths of `slots`, a multiple of kTilePixels, if all of them are active.
     uint64_t most_light_subpaths(uint32_t slots) const {
-        return uint64_t(slots / kTilePixels) * light_subpaths_per_tile;
+        return std::min(uint64_t(slots / kTilePixels) * light_subpaths_per_tile, iteration_light_subpaths);
     }
     /// The most items that a stage goes through in order (OrderMemory::slots).
     uint32_t order_slots(uint32_t slots) const { return slots_in_flight ? slots_in_flight : slots; }

@@ -15,6 +15,16 @@ struct StateSize {
     PrimitiveBytes primitives;
 };
 
+/// The first `lanes` lanes of the first `items` of an array that had too little room (AppendedState).
+template <class Item, class Copy>
+void take_lanes(LaneArray<Item> to, LaneArray<Item> from, uint32_t lanes, uint32_t items, Copy copy) {
+    for (uint32_t lane = 0; lane < lanes;) {
+        const uint32_t together = lane < paired_lanes<Item>() ? 2 : 1;
+        copy(to.base + to.place(0, lane), from.base + from.place(0, lane), uint64_t(together) * items);
+        lane += together;
+    }
+}
+
 /// Most methods keep nothing.
 struct NoState {
     static constexpr StateKind kKind = StateKind::none;

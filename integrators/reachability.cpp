@@ -41,7 +41,17 @@ struct Word {
     }
 };
 
+/// Strategies that are joined at the first vertex, seen from the camera, that no delta lobe passes (kJoinedAtFirst).
+bool finds_at_first(uint32_t strategies, const Word& w) {
+    int first = w.segments - 1;
+    while (first > 0 && !w.connectable(first)) --first;
+    if (first == 0) return w.origin == Origin::extent && (strategies & kHitStrategies);
+    if (first == 1) return w.origin != Origin::beam && (strategies & kNextEventStrategies);
+    return (strategies & kConnectionStrategies) && w.connectable(first - 1);
+}
+
 bool finds(uint32_t strategies, const Word& w) {
+    if (strategies & kJoinedAtFirst) return finds_at_first(strategies, w);
     if (w.origin == Origin::extent && (strategies & kHitStrategies)) return true;
     if (w.segments == 1) return w.origin == Origin::extent && (strategies & kLightStrategies);
     if ((strategies & kNextEventStrategies) && w.origin != Origin::beam && w.connectable(1)) return true;

@@ -11,9 +11,9 @@ namespace ambilux {
 
 /// Words of Heckbert's notation with emitters told apart: "L" has extent, "Ld" is a delta (point, spot, directional),
 /// "Lb" a beam (is_beam); "S" is passed by a delta lobe, "D" by another one; "E" is the camera. Returns the shortest
-/// word that paths of a scene of `features` may have, that `reference` (StrategyBits, kMergeStrategies) finds and
-/// `strategies` do not; empty if there is none. Conservative: a word counts as soon as the scene has its letters.
-/// `max_depth`: segments; -1: no limit.
+/// word that paths of a scene of `features` may have, that `reference` (StrategyBits, kMergeStrategies, kJoinedAtFirst)
+/// finds and `strategies` do not; empty if there is none. Conservative: a word counts as soon as the scene has its
+/// letters. `max_depth`: segments; -1: no limit.
 std::string unreachable_path(const Features& features, uint32_t strategies, uint32_t reference, int max_depth);
 
 /// The shortest word that `strategies` do not find, whether others do or not; empty if there is none.

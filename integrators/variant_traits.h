@@ -33,6 +33,9 @@ enum class Merges : uint32_t {
 
 /// Beside StrategyBits: both subpaths end at one vertex, within a radius.
 constexpr uint32_t kMergeStrategies = 16;
+/// Beside StrategyBits: eye subpaths go on through deltas alone. They meet emitters so, and are joined with light
+/// subpaths where they would first scatter by another lobe.
+constexpr uint32_t kJoinedAtFirst = 32;
 
 /// What a variant of an integrator has. Settings that need something else are refused by name (setting.h).
 struct VariantTraits {

@@ -21,7 +21,9 @@ uint32_t WavePlan::kept() const {
                                        : 0;
 }
 
-uint64_t WavePlan::iteration_subpaths() const { return uint64_t(light_subpaths_) * waves_.iteration_samples; }
+uint64_t WavePlan::iteration_subpaths() const {
+    return std::min(uint64_t(light_subpaths_) * waves_.iteration_samples, waves_.iteration_light_subpaths);
+}
 
 void WavePlan::keep(uint64_t vertices) {
     mean = std::max(mean, double(vertices) / double(waves_.most_light_subpaths(wave.slot_count())));

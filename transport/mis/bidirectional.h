@@ -42,6 +42,7 @@ struct SubpathStart {
 struct ConnectionDensities {
     float y_area, y_reverse_sa;  ///< of y by sampling at z; of the way back from y
     float z_area, z_reverse_sa;
+    float geometry = 0.0f;  ///< cosines at both, to the geometric normals, over the squared distance
 };
 
 struct BidirectionalMis {

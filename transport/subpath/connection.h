@@ -38,7 +38,7 @@ AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, co
     c.value = y.throughput * f_y.value * f_z.value * z.throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.vertex.point.ng, w)), cos_z = fabsf(dot(z.vertex.point.ng, w));
     const ConnectionDensities densities = {f_z.pdf_sa * cos_y / d2, f_y.pdf_reverse_sa, f_y.pdf_sa * cos_z / d2,
-                                           f_z.pdf_reverse_sa};
+                                           f_z.pdf_reverse_sa, cos_y * cos_z / d2};
     if (!set_segment(c, z.vertex, w, y.vertex.point.p, y.vertex.offset, y.vertex.point.ng)) return false;
     c.ratio = rules.counted(
         rules.mis.connection_ratio(y.vertex.sums, y.vertex.first, z.vertex.sums, z.vertex.first, densities));

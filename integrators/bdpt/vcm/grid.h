@@ -131,16 +131,6 @@ struct VcmState {
         copy(order.keys[0], old.order.keys[0], items);
         copy(order.values[0], old.order.values[0], items);
     }
-
-private:
-    template <class Item, class Copy>
-    static void take_lanes(LaneArray<Item> to, LaneArray<Item> from, uint32_t lanes, uint32_t items, Copy copy) {
-        for (uint32_t lane = 0; lane < lanes;) {
-            const uint32_t together = lane < paired_lanes<Item>() ? 2 : 1;
-            copy(to.base + to.place(0, lane), from.base + from.place(0, lane), uint64_t(together) * items);
-            lane += together;
-        }
-    }
 };
 
 /// Light vertices within a radius, one after the other.

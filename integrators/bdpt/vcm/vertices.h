@@ -1,6 +1,7 @@
 // Light vertices of a wave are kept, appended to those of all waves, and put in the order of their cells.
 #pragma once
 
+#include "integrators/bdpt/shared/subpath_number.h"
 #include "integrators/bdpt/vcm/grid.h"
 #include "integrators/bdpt/vcm/policy.h"
 #include "stages/stage.h"
@@ -74,15 +75,10 @@ private:
                                                  y.sums.dvm});
         if (place >= kept.merges.capacity()) return;
         const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(table_bits);
-        kept.keys[place] = merge_key(cell, subpath(slot), path.depth);
+        kept.keys[place] = merge_key(cell, light_subpath_number(wave, slot, samples, rounds), path.depth);
         if (!connects) return;
         const auto vertex = pack_connection_vertex(y, path, kNone);
         kept.connections.store(place, vertex, lanes_of<F>(vertex));
-    }
-    /// Number of the light subpath in the iteration.
-    AMBILUX_HD uint32_t subpath(uint32_t slot) const {
-        const RngKey key = wave.key(slot, Stream::light);
-        return (key.sample - wave.state->iteration * samples) * (wave.width * wave.height * rounds) + key.index;
     }
 };
 
