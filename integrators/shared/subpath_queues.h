@@ -44,16 +44,17 @@ struct NothingBefore {
     void operator()(A...) const {}
 };
 
-/// From the hits of depth 1 in place 0 on: after before(k) vertex[k] goes through the hits of a depth in place k and
-/// pushes rays to place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where
-/// a device takes fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one
-/// path more than once.
+/// From the hits of depth 1 in place 0 on: after before(k, vertex[k]) vertex[k] goes through the hits of a depth in
+/// place k and pushes rays to place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is
+/// true where a device takes fewer than `multi_bounce_below` subpaths through several at once: what is pushed may
+/// belong to one path more than once. With something to be done before the vertices of every depth it takes one at a
+/// time.
 template <class Executor, class VertexStage, class Extend, class Rest, class Before = NothingBefore>
 void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend (&extend)[2],
                    uint32_t multi_bounce_below, Rest rest, Before before = {}) {
     const auto two_rounds = [&](auto several_bounces) {
         for (const int k : {0, 1}) {
-            before(k);
+            before(k, vertex[k]);
             if constexpr (several_bounces)
                 exec.run(MultiBounce<VertexStage, Extend>{vertex[k], extend[1 - k], vertex[k].record});
             else
@@ -63,7 +64,7 @@ void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend 
             exec.extend(extend[1 - k]);
         }
     };
-    if constexpr (!Executor::kHost) {
+    if constexpr (!Executor::kHost && std::is_same_v<Before, NothingBefore>) {
         if (multi_bounce_below > 0) {
             exec.repeat_while(extend[0].hits, [&] { two_rounds(std::false_type()); }, multi_bounce_below);
             exec.repeat_while(extend[0].hits, [&] { two_rounds(std::true_type()); });

@@ -1,6 +1,8 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // Integrators that merge on a device: the image of the CPU, and bits that depend on no size of waves.
+#include <cmath>
+
 #include "tests/support/gpu_device.h"
 #include "tests/support/whole_iterations.h"
 
@@ -41,6 +43,20 @@ TEST_CASE("What is vcm with strategies switched off: CPU and CUDA agree") {
             INFO(integrator << ", " << name);
             check_on_device(scene, merging(scene, integrator), 8);
         }
+}
+
+TEST_CASE(
+    "What merges loses nothing where few subpaths are left, as other integrators take those through several bounces") {
+    if (!device()) return;
+    const Scene scene = project_scene("cornell", 64, 48);
+    for (const char* integrator : {"vcm", "bpm"}) {
+        INFO(integrator);
+        RenderSettings s = merging(scene, integrator);
+        apply_setting(s, "deterministic", "false");
+        const double cpu = mean_of(render_scene(scene, s, 8).film);
+        s.backend = Backend::cuda;
+        CHECK(std::fabs(mean_of(render_scene(scene, s, 8).film) / cpu - 1) < 2e-3);
+    }
 }
 
 TEST_CASE("vcm with more eye vertices than merge in the order in which they come: CPU and CUDA agree") {

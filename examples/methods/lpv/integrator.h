@@ -35,7 +35,6 @@ struct LpvIntegrator {
         p.cascades = lpv::Cascades::plan(scene, p.volumes);
         p.waves.keeps_light_vertices = false;
         p.waves.iteration_samples = p.volumes.iteration_samples;
-        p.waves.multi_bounce_below = 0;  // gathering is a stage of its own
         if (!scene.emitters.empty() && p.rules.max_depth >= 3) p.light_subpaths = p.volumes.lights(scene);
         return p;
     }
@@ -151,7 +150,7 @@ private:
             if constexpr (!kFusion.connect) exec.run(eye.connect_emitter);
             run_candidates(exec, eye.eye, several_bounces);
         };
-        repeat_depths(exec, eye.eye_vertex, eye.extend, 0, rest, [&](int k) {
+        repeat_depths(exec, eye.eye_vertex, eye.extend, 0, rest, [&](int k, const auto&) {
             if (s.policy.light_subpaths > 0) exec.for_each(s.gather[k], s.gather[k].hits);
         });
         exec.set_depth(0);

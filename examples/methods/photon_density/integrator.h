@@ -26,6 +26,7 @@ struct PhotonDensityIntegrator {
         photon_density::Settings photons;
     };
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
+        need_one_light_subpath(settings, "photon_density has one for each sample of a pixel");
         Policy p{plan_bdpt(scene, settings), photon_density::Settings::plan(settings)};
         // Light subpaths have photons where others have connections with the camera; paths have one segment more.
         p.rules.splat = !scene.emitters.empty() && p.rules.max_depth >= 2;

@@ -132,7 +132,7 @@ struct LightStages {
     }
 };
 
-/// `before(k, first_key)`: what else is done with the hits in place k (Wave::first_key).
+/// `before(k, vertex)`: what else is done with the hits in place k, before stage `vertex`.
 template <class Executor, Features F, class Tracer, Fusion K, class Mis, class Before = NothingBefore>
 void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K, Mis>& all,
                         const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p, Before before = {}) {
@@ -147,8 +147,7 @@ void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K, Mis>& al
             if constexpr (!K.connect) exec.run(s.connect_camera);
             run_splats(exec, splats);
         };
-        repeat_depths(exec, s.vertex, s.extend, p.waves.multi_bounce_below, rest,
-                      [&](int k) { before(k, s.vertex[k].wave.first_key); });
+        repeat_depths(exec, s.vertex, s.extend, p.waves.multi_bounce_below, rest, before);
         exec.set_depth(0);
     }
     exec.fail_on_overflow(all.vertex[0].vertices, splats.splat.splats);

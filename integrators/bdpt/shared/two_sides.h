@@ -138,7 +138,7 @@ void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>&
     });
 }
 
-/// `before(k)`: what else is done with the hits in place k.
+/// `before(k, vertex)`: what else is done with the hits in place k, before stage `vertex`.
 template <class Executor, Features F, class Tracer, Fusion K, class Source, class Before = NothingBefore>
 void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, Before before = {}) {
     const auto& rules = s.policy.rules;

@@ -126,10 +126,10 @@ private:
         const auto& all = s.two_sides;
         if (all.policy.rules.max_depth == 0 || !all.policy.light_subpaths()) return;
         exec.for_each(s.set_radius, 1);
-        run_light_subpaths(exec, all.light, all.splats, all.policy, [&](int k, uint32_t first_key) {
+        run_light_subpaths(exec, all.light, all.splats, all.policy, [&](int k, const auto& vertex) {
             if (!s.keeps) return;
             KeepVertices<F> keep = s.keep[k];
-            keep.wave.first_key = first_key;
+            keep.wave.first_key = vertex.wave.first_key;
             exec.for_each(keep, keep.hits);
         });
         if (s.keeps) {
@@ -144,7 +144,7 @@ private:
         const auto& all = s.two_sides;
         if (all.policy.rules.max_depth == 0) return;
         exec.for_each(s.set_radius, 1);
-        run_eye_subpaths(exec, all, [&](int k) {
+        run_eye_subpaths(exec, all, [&](int k, const auto&) {
             if (s.keeps) merge(exec, s.order[k], s.merge[k]);
         });
     }

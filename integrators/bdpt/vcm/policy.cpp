@@ -20,7 +20,6 @@ VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
     p.keeps_vertices = !scene.emitters.empty() && p.rules.max_depth >= 2 && !p.rules.singles.on;
     p.waves.iteration_samples = p.vcm.samples;
     p.waves.strategy_merges = p.waves.strategy_depth > 0;
-    p.waves.multi_bounce_below = 0;  // merges are a stage of their own
     if (p.rules.connect) p.cache_draws = settings.connections;
     p.one_connection_per_launch |= p.cache_draws == 1;
     const uint64_t keys =
