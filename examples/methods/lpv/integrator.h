@@ -2,6 +2,9 @@
 // Real-Time Indirect Illumination"). The first vertices of light subpaths become virtual lights in nested grids, whose
 // light spreads from cell to cell; eye subpaths look it up at their first vertex. Each iteration has light subpaths of
 // its own, and the image is their mean.
+// Directions blur from cell to cell, so that light turns and surfaces also light themselves: within a box the bounce
+// has about the right mean, on an open floor it is several times too bright. Left out of the paper's parts: damping by
+// the gradient, blockers that the camera sees, further bounces.
 #pragma once
 
 #include "gather.h"
