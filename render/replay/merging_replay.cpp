@@ -40,9 +40,9 @@ private:
         if (!policy_.keeps_vertices) return {};
         const uint32_t samples = policy_.vcm.samples, first = request.sample / samples * samples;
         const auto lights = iterations_.get(first, [&] { return light_vertices(ctx, first); });
-        out.notes.push_back(fmt::format("iteration {}, of samples {} to {}: {} light vertices, radius {:.6g}",
-                                        first / samples, first, first + samples - 1, lights->size(),
-                                        ctx.rules.mis.now->radius));
+        const std::string shared = samples > 1 ? fmt::format(", of samples {} to {}", first, first + samples - 1) : "";
+        out.notes.push_back(fmt::format("iteration {}{}: {} light vertices, radius {:.6g}", first / samples, shared,
+                                        lights->size(), ctx.rules.mis.now->radius));
         Joins joins;
         joins.merge = [lights](ReplayEye<Mis>& eye) { replay_merges(eye, *lights); };
         if (policy_.rules.connect)
