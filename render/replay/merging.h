@@ -1,8 +1,6 @@
 // The light vertices of an iteration of a method that merges, by its own stages, and the merges of an eye subpath.
 #pragma once
 
-#include <optional>
-
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/whole_executor.h"
 #include "integrators/bdpt/vcm/merge.h"

@@ -73,6 +73,7 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"trace", kCornell, "--sample", "0", "--light-subpath", "99999999", "-i", "light"}, "below 65536"},
         {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "toy"}, "there is no replay"},
         {render(folder, {"-i", "toy", "--outliers", "1"}), "there is no replay"},
+        {render(folder, {"-i", "vcm", "--set", "merge_samples=2", "--spp", "2", "--outliers", "1"}), "merge_samples=1"},
         {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "bdpt", "--set", "bdpt.auto=true"}, "printed"},
     };
     for (const Case& c : cases) {

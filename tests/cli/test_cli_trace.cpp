@@ -14,7 +14,7 @@ using nlohmann::json;
 TEST_CASE("Outliers come with a command that replays them") {
     const test::TempFolder folder;
     for (const std::vector<std::string>& method :
-         {std::vector<std::string>{}, {"-i", "bdpt"}, {"-i", "bdpt", "--variant", "lvc"}}) {
+         {std::vector<std::string>{}, {"-i", "bdpt"}, {"-i", "bdpt", "--variant", "lvc"}, {"-i", "vcm"}}) {
         std::vector<std::string> more = {"--spp", "4",          "--backend", "cpu",   "--seed",
                                          "3",     "--outliers", "2",         "--set", "specialise=false"};
         more.insert(more.end(), method.begin(), method.end());
