@@ -68,4 +68,6 @@ TEST_CASE("photon_density: iterations are whole, and a render goes on from its f
     RenderSettings s = settings_of(scene);
     apply_setting(s, "photon_samples", "4");
     check_resumes_from_film(scene, s);
+    apply_setting(s, "light_paths", "2");
+    CHECK_THROWS_WITH(make_renderer(scene, s), ContainsSubstring("light_paths=2"));
 }
