@@ -40,6 +40,14 @@ inline uint64_t free_device_bytes() {
 /// wait for the whole device breaks.
 inline void wait_for_default_stream(const char* what) { cuda_check(cudaStreamSynchronize(nullptr), what); }
 
+/// A copy to the device that has ended when this returns. By itself cudaMemcpy may return before its last bytes are
+/// there, and streams that do not wait for the default one would overtake it.
+inline void copy_and_wait(void* to, const void* from, uint64_t bytes, cudaMemcpyKind kind, const char* what) {
+    if (bytes == 0) return;
+    cuda_check(cudaMemcpy(to, from, bytes, kind), what);
+    wait_for_default_stream(what);
+}
+
 /// An array on the device, not initialised. Without elements it holds no memory and data() is null. Copies run on the
 /// default stream.
 template <class T>
@@ -76,7 +84,7 @@ public:
             *this = DeviceBuffer();
             *this = DeviceBuffer(values.size());
         }
-        if (size_) cuda_check(cudaMemcpy(data_, values.data(), bytes(), cudaMemcpyHostToDevice), "copy to the device");
+        copy_and_wait(data_, values.data(), bytes(), cudaMemcpyHostToDevice, "copy to the device");
     }
     /// Copies to the host, after the work on the default stream.
     std::vector<T> download() const {
@@ -106,13 +114,13 @@ public:
     uint64_t bytes() const { return buffer_.bytes(); }
 
     static void put(void* to, const void* from, uint64_t bytes) {
-        if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice), "copy to the device");
+        copy_and_wait(to, from, bytes, cudaMemcpyHostToDevice, "copy to the device");
     }
     static void get(void* to, const void* from, uint64_t bytes) {
         if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost), "copy from the device");
     }
     static void copy(void* to, const void* from, uint64_t bytes) {
-        if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToDevice), "copy on the device");
+        copy_and_wait(to, from, bytes, cudaMemcpyDeviceToDevice, "copy on the device");
     }
     static void clear(void* to, uint64_t bytes) {
         if (bytes == 0) return;
