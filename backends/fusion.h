@@ -1,7 +1,7 @@
 // Which stages a backend runs as parts of others: all that it decides of a schedule.
 #pragma once
 
-#include "stages/stage.h"
+#include "stages/fusion.h"
 
 namespace ambilux {
 

@@ -2,7 +2,7 @@
 // slowest ray: so they go on for several bounces in one launch.
 #pragma once
 
-#include "stages/stage.h"
+#include "queues/stage_record.h"
 
 namespace ambilux {
 

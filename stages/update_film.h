@@ -3,7 +3,8 @@
 #pragma once
 
 #include "film/splat_sums.h"
-#include "stages/stage.h"
+#include "queues/wave.h"
+#include "stages/counted.h"
 
 namespace ambilux {
 

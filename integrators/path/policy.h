@@ -3,6 +3,7 @@
 
 #include "integrators/integrator.h"
 #include "transport/mis/unidirectional.h"
+#include "transport/subpath/rules.h"
 
 namespace ambilux {
 

@@ -4,6 +4,7 @@
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/whole_executor.h"
 #include "integrators/bdpt/vcm/merge.h"
+#include "integrators/bdpt/vcm/merging_directions.h"
 #include "integrators/bdpt/vcm/source.h"
 #include "render/replay/eye.h"
 #include "render/replay/light.h"

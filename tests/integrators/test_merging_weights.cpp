@@ -2,7 +2,7 @@
 // timeout: 300
 // Weights of vertex connection and merging (integrators/bdpt/vcm/merging_mis.h) against the densities of all strategies
 // enumerated, merges among them.
-#include "integrators/bdpt/vcm/merging_mis.h"
+#include "integrators/bdpt/vcm/merging_directions.h"
 #include "tests/support/bidirectional_paths.h"
 
 namespace ambilux {

@@ -10,7 +10,7 @@
 #include "gather.h"
 #include "inject.h"
 #include "integrators/bdpt/shared/policy.h"
-#include "integrators/bdpt/vcm/merging_mis.h"
+#include "integrators/bdpt/vcm/merging_directions.h"
 #include "integrators/path/integrator.h"
 #include "propagate.h"
 

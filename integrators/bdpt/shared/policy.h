@@ -3,6 +3,7 @@
 
 #include "integrators/integrator.h"
 #include "transport/mis/bidirectional.h"
+#include "transport/subpath/rules.h"
 
 namespace ambilux {
 

@@ -5,6 +5,7 @@
 
 #include "integrators/bdpt/shared/two_sides.h"
 #include "integrators/bdpt/vcm/merge.h"
+#include "integrators/bdpt/vcm/merging_directions.h"
 #include "integrators/bdpt/vcm/pixel_radius.h"
 #include "integrators/bdpt/vcm/source.h"
 

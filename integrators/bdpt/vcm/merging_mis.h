@@ -9,7 +9,7 @@
 
 #include "integrators/variant_traits.h"
 #include "transport/mis/bidirectional.h"
-#include "transport/subpath/bsdf_directions.h"
+#include "transport/subpath/directions.h"
 
 namespace ambilux {
 
@@ -25,19 +25,14 @@ struct MergingSums {
     float dvcm, dvc, dvm;
 };
 
-/// Of eye subpaths that end where they would leave a vertex by another lobe than a delta.
+/// Of eye subpaths that end where they would leave a vertex by another lobe than a delta (merging_directions.h).
 struct MergingDirections {
     bool deltas_only = false;
 
     template <Features F, class Mis>
-    AMBILUX_HD bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s) const {
-        return BsdfDirections::sample<F>(v, u, mode, s) &&
-               !(deltas_only && mode == TransportMode::radiance && !(s.flags & kScatterDelta));
-    }
+    AMBILUX_HD bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s) const;
     template <Features F, class Mis>
-    AMBILUX_HD static BsdfValue evaluate(const Vertex<Mis>& v, Vec3f wo, TransportMode mode) {
-        return BsdfDirections::evaluate<F>(v, wo, mode);
-    }
+    AMBILUX_HD static BsdfValue evaluate(const Vertex<Mis>& v, Vec3f wo, TransportMode mode);
 };
 
 struct MergingMis : BidirectionalMis {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "integrators/bdpt/shared/two_sides.h"
+#include "integrators/bdpt/vcm/merging_directions.h"
 #include "integrators/bdpt/vpl/light_set.h"
 #include "integrators/bdpt/vpl/source.h"
 
