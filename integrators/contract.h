@@ -6,6 +6,7 @@
 #include "accel/host_tracer.h"
 #include "integrators/integrator.h"
 #include "integrators/kept_state.h"
+#include "items/candidate_items.h"
 
 namespace ambilux {
 namespace contract {
