@@ -5,6 +5,7 @@
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda/handles.h"
 #include "backends/cuda_device.h"
+#include "items/candidate_items.h"
 #include "tests/support/catch.h"
 #include "tests/support/primitive_cases.h"
 #include "tests/support/skip.h"
