@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "stress/families.h"
@@ -13,6 +14,14 @@ Cell cavity_cell(const std::string& family, const std::string& label, double val
     Cell cell{family, label, value, cavity_answer(cavity), [cavity] { return SceneFiles{cavity_scene(cavity)}; }};
     cell.only = kMerging;
     return cell;
+}
+
+/// Settings for 2^k light subpaths an iteration, of 16 x 16 pixels, in as few samples as may be.
+std::vector<std::pair<std::string, std::string>> subpaths_of(int k, const char* radius) {
+    const int per_pixel = k - 8, in_a_sample = std::min(per_pixel, 4);
+    return {{"light_paths", decade(std::exp2(in_a_sample))},
+            {"merge_samples", whole(std::exp2(per_pixel - in_a_sample))},
+            {"merge_radius", radius}};
 }
 
 Family radii() {
@@ -38,10 +47,8 @@ Family vertices() {
         const double subpaths = std::exp2(k);
         Cell cell = cavity_cell(family.name, whole(subpaths), subpaths, cavity);
         cell.benign = k == 10;
-        const int per_pixel = k - 8, in_a_sample = std::min(per_pixel, 4);  // of 16 x 16 pixels
-        cell.settings = {{"light_paths", decade(std::exp2(in_a_sample))},
-                         {"merge_samples", whole(std::exp2(per_pixel - in_a_sample))},
-                         {"merge_radius", "0.003"}};
+        cell.settings = subpaths_of(k, "0.003");
+        cell.device_only = k > 20;
         cell.effort = std::exp2(std::min(0, 14 - k));
         family.cells.push_back(cell);
     }
@@ -68,7 +75,8 @@ Family one_cell() {
         Cell cell{family.name, whole(subpaths), subpaths, answer, scene};
         cell.only = kMerging;
         cell.benign = k == 8;
-        cell.settings = {{"merge_samples", whole(std::exp2(k - 8))}, {"merge_radius", "0.1"}};
+        cell.settings = subpaths_of(k, "0.1");
+        cell.device_only = k > 16;  // every query looks at every vertex
         cell.not_mitsuba = "it has no method that finds this light";
         family.cells.push_back(cell);
     }
