@@ -9,11 +9,9 @@ namespace ambilux {
 namespace {
 
 constexpr uint32_t kSamples = 4;
-constexpr uint32_t kMostBlocks = 32, kSmallestBlock = 4;  ///< a side; pixels of a side
 
 std::vector<double> variance_by_block(const FilmMoments& film) {
-    const auto blocks = [](uint32_t pixels) { return std::clamp(pixels / kSmallestBlock, 1u, kMostBlocks); };
-    const FilmBlocks all = {blocks(film.width), blocks(film.height)};
+    const FilmBlocks all = FilmBlocks::of(film.width, film.height);
     const double n = double(film.samples);
     std::vector<double> variance;
     for (uint32_t b = 0; b < all.count(); ++b) {

@@ -44,6 +44,11 @@ inline float filter_coverage(const SceneView& scene, Vec2f film) {
 struct FilmBlocks {
     uint32_t x = 0, y = 0;
 
+    /// At most 32 along a side, of at least 4 pixels along each.
+    static FilmBlocks of(uint32_t width, uint32_t height) {
+        const auto along = [](uint32_t pixels) { return std::clamp(pixels / 4, 1u, 32u); };
+        return {along(width), along(height)};
+    }
     uint32_t count() const { return x * y; }
     uint32_t at(const Sensor& s, Vec2f film) const {
         const auto index = [](float position, uint32_t pixels, uint32_t blocks) {

@@ -22,8 +22,6 @@ namespace {
 
 /// Samples of one pixel: their products estimate its squared mean.
 constexpr uint32_t kPixelSamples = 4;
-constexpr uint32_t kMostBlocks = 32;    ///< a side
-constexpr uint32_t kSmallestBlock = 4;  ///< pixels
 constexpr uint32_t kSubpathsPerTask = 32;
 
 using PilotSubpath = Subpath<PilotMis>;
@@ -79,8 +77,7 @@ public:
         : view_(scene.view()), settings_(settings), cuda_(cuda), tracer_(tracer), moments_{candidates} {
         set_rules(scene);
         const Sensor& sensor = view_.sensor;
-        const auto blocks = [](uint32_t pixels) { return std::clamp(pixels / kSmallestBlock, 1u, kMostBlocks); };
-        blocks_ = {blocks(sensor.crop_width), blocks(sensor.crop_height)};
+        blocks_ = FilmBlocks::of(sensor.crop_width, sensor.crop_height);
         result_.blocks_x = blocks_.x;
         result_.blocks_y = blocks_.y;
         pixels_ = std::max(1u, (samples / kPixelSamples + blocks_.count() / 2) / blocks_.count());
