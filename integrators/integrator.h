@@ -33,6 +33,8 @@ struct WavePolicy {
     uint32_t most_paths = ~0u;             ///< of a wave, as items can number them
     uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
     uint32_t iteration_samples = 1;        ///< of every pixel in one iteration
+    uint32_t iterations_together = 1;      ///< iterations that are done at once, at most: the renderer takes as many as
+                                           ///< fill a machine
     uint64_t iteration_light_subpaths = ~0ull;  ///< of an iteration, at most: those beyond are not begun
     bool keeps_light_vertices = false;          ///< queues of light vertices or splats hold those of a whole wave
 

@@ -27,7 +27,7 @@ struct WaveState {
     uint32_t failed;          ///< WaveFailure: the wave, and on a device all after it, do nothing until there is room
     uint32_t done;            ///< waves of phases that may fail, and did not
     uint32_t light_subpaths;  ///< of this wave
-    uint32_t iteration;       ///< number of the iteration that this wave belongs to
+    uint32_t iteration;       ///< number of the first of the iterations that are done with this wave's
     uint32_t appended;        ///< where this wave's part of what all waves append to begins
     alignas(128) uint32_t next =
         0;  ///< slots that threads of a launch have claimed; away from what is read all the time

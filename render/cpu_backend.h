@@ -92,14 +92,19 @@ public:
     // ---- rendering ----
 
     /// Samples to render before clocks and signals are looked at again, at most `batch`.
-    uint32_t pass(uint32_t batch, const volatile bool*, uint64_t) const { return Maker::kFilmWide ? 1 : batch; }
+    uint32_t pass(uint32_t batch, const volatile bool*, uint64_t) const {
+        return Maker::kFilmWide ? uint32_t(maker_.plan.film_wave.samples) : batch;
+    }
     /// Adds samples [first, first + count) of every pixel to the film. Returns how many are finished: all.
     template <class State>
     uint32_t run(uint32_t first, uint32_t count, State& state) {
-        constexpr bool kApart = contract::HasIteration<Integrator> || kWholeIterations<Integrator>;
-        const uint32_t step = kApart ? maker_.policy.waves.iteration_samples : count;
         arena_.execute([&] {
+            uint32_t step = count;
             for (uint32_t s = first; s < first + count; s += step) {
+                if constexpr (kWholeIterations<Integrator>)
+                    step = maker_.samples_together(s, first + count - s);
+                else if constexpr (contract::HasIteration<Integrator>)
+                    step = maker_.policy.waves.iteration_samples;
                 Iteration<State> iteration = {*this, state, s, step};
                 run_iteration<Integrator>(iteration);
                 if constexpr (Maker::kFilmWide) update_film(s, step);
@@ -181,7 +186,7 @@ private:
                 w.state->first_sample = sample;
                 w.state->samples = samples;
                 w.state->light_subpaths = samples * light_subpaths;
-                w.state->iteration = backend.iteration_of(sample);
+                w.state->iteration = backend.iteration_of(first);
                 CpuExecutor exec(w.state, maker.view, w.order);
                 body(exec, stages);
                 if (w.state->failed) return again({part.first_tile, part.tiles, sample, part.count - s}, body, w);

@@ -117,7 +117,7 @@ public:
         while (done < count) {
             uint32_t step = count - done;
             if constexpr (kWholeIterations<Integrator>)
-                step = maker_.policy.waves.iteration_samples;
+                step = maker_.samples_together(first + done, step);
             else if constexpr (contract::HasIteration<Integrator>)
                 step = std::min(step, maker_.plan.in_parts() ? 1 : uint32_t(maker_.plan.wave.samples));
             Iteration<State> iteration = {*this, state, first + done, step};
@@ -175,7 +175,7 @@ private:
             for (uint32_t tile = 0;;) {
                 for (uint32_t s = 0; s < count; s += plan.wave.samples)
                     for (uint32_t t = s ? 0 : tile; t < tile_count(plan.wave); t += plan.wave.tiles)
-                        backend.launch_wave(phase, body, t, first + s,
+                        backend.launch_wave(phase, body, kWholeIterations<Integrator> ? first : first + s, t, first + s,
                                             std::min<uint32_t>(plan.wave.samples, count - s));
                 if (!backend.may_fail(phase)) break;
                 backend.wait();
@@ -190,6 +190,8 @@ private:
                     break;
                 }
                 if (plan.in_parts() && !kWholeIterations<Integrator>) count = 1;
+                if (kWholeIterations<Integrator> && phase == 0)  // iterations that no longer fit into the wave
+                    count = std::min(count, uint32_t(plan.wave.samples));
             }
             ++phase;
         }
@@ -219,12 +221,13 @@ private:
         if constexpr (!Maker::kFilmWide) film.samples = wave_.samples;
         exec.run_slots(maker_.update_film(wave, film, layout_.record(UpdateFilm::kName)), wave.tiles * kTilePixels, 1);
     }
-    WaveState wave_state(uint32_t tile, uint32_t sample, uint32_t samples) const {
+    /// `first`: sample of the iterations that are done at once.
+    WaveState wave_state(uint32_t first, uint32_t tile, uint32_t sample, uint32_t samples) const {
         WaveState s = {};
         s.first_tile = tile;
         s.first_sample = sample;
         s.samples = samples;
-        s.iteration = sample / maker_.policy.waves.iteration_samples;
+        s.iteration = first / maker_.policy.waves.iteration_samples;
         return s;
     }
     void wait() {
@@ -236,15 +239,15 @@ private:
         detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
         cuda_check(cudaGetLastError(), "wave");
     }
-    void set_film_state(uint32_t first, uint32_t count) { set_state(wave_state(0, first, count)); }
+    void set_film_state(uint32_t first, uint32_t count) { set_state(wave_state(first, 0, first, count)); }
     /// After the last part of the film; nothing if one of them failed.
     void finish_film(uint32_t first, uint32_t count) {
         set_film_state(first, count);
         executor_->launch([&](Exec& exec) { update_film(exec, maker_.plan.film_wave); });
     }
     template <class Body>
-    void launch_wave(size_t phase, const Body& body, uint32_t tile, uint32_t sample, uint32_t samples) {
-        WaveState state = wave_state(tile, sample, samples);
+    void launch_wave(size_t phase, const Body& body, uint32_t first, uint32_t tile, uint32_t sample, uint32_t samples) {
+        WaveState state = wave_state(first, tile, sample, samples);
         state.light_subpaths = samples * maker_.plan.light_subpaths(tile);
         set_state(state);
         if (!phases_.empty())

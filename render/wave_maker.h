@@ -44,6 +44,14 @@ struct WaveMaker {
     State state{};
     uint32_t appended = 0;  ///< capacity of what all waves append to
 
+    /// Samples of the iterations that are done at once from sample `first` on, at most `most`, which are whole ones.
+    uint32_t samples_together(uint32_t first, uint32_t most) const {
+        const uint32_t k = policy.waves.iteration_samples;
+        uint32_t iterations = std::min(most, plan.film_wave.samples) / k;
+        if constexpr (requires { policy.together(0u); }) iterations = std::min(iterations, policy.together(first / k));
+        return iterations * k;
+    }
+
     /// Samples lie in the memory of a wave until they are added to the film, or copied there.
     bool keeps_samples() const { return !kFilmWide || (threads == 0 && plan.in_parts()); }
 

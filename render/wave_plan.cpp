@@ -21,8 +21,31 @@ uint32_t WavePlan::kept() const {
                                        : 0;
 }
 
-uint64_t WavePlan::iteration_subpaths() const {
-    return std::min(uint64_t(light_subpaths_) * waves_.iteration_samples, waves_.iteration_light_subpaths);
+uint64_t WavePlan::light_subpaths_together() const {
+    return waves_.iterations_together *
+           std::min(uint64_t(light_subpaths_) * waves_.iteration_samples, waves_.iteration_light_subpaths);
+}
+
+uint64_t WavePlan::slots_together() const {
+    return uint64_t(tile_count(shape_wave(scene_, 0, kTilePixels, 1))) * kTilePixels *
+           (whole_iterations_ ? waves_.iteration_samples * waves_.iterations_together : 1);
+}
+
+void WavePlan::choose_iterations(const std::function<bool()>& fits) {
+    uint32_t& together = waves_.iterations_together;
+    if (!whole_iterations_) together = 1;
+    if (together == 1) return shape_least();
+    const uint64_t paths = threads_ > 0              ? 4ull * threads_ * kHostWaveSize
+                           : settings_.wave_size > 0 ? settings_.wave_size
+                                                     : kIterationsPlateau;
+    const uint64_t alone = slots_together() / together, asked = settings_.expected_samples / waves_.iteration_samples;
+    together = uint32_t(std::clamp<uint64_t>(paths / alone, 1, together));
+    if (asked > 0) together = uint32_t(std::min<uint64_t>(together, asked));
+    for (;; together /= 2) {
+        shape(threads_ == 0 && together > 1 ? uint32_t(slots_together()) : least_size());
+        if (together == 1 || fits()) break;
+    }
+    shape_least();
 }
 
 void WavePlan::keep(uint64_t vertices) {
@@ -45,7 +68,7 @@ void WavePlan::shape_on_host() {
     if (film_wide_) wave.samples = 1;  // a sample is complete when all its waves are done
     film_wave = wave;
     film_wave.tiles = (tile_count(wave) + wave.tiles - 1) / wave.tiles * wave.tiles;
-    if (whole_iterations_) film_wave.samples = waves_.iteration_samples;
+    if (whole_iterations_) film_wave.samples = waves_.iteration_samples * waves_.iterations_together;
     if (streams()) waves_.slots_in_flight = std::max(kTilePixels, wave.slot_count() / 4);
 }
 
@@ -53,8 +76,9 @@ void WavePlan::shape_on_device() {
     wave = shape_wave(scene_, settings_.seed, size_, ~0u);
     const uint32_t all = tile_count(wave);
     if (whole_iterations_) {
-        wave.samples = waves_.iteration_samples;
-        wave.tiles = std::clamp(size_ / (wave.samples * kTilePixels), 1u, all);
+        const uint32_t samples = waves_.iteration_samples;
+        wave.tiles = std::clamp(size_ / (samples * kTilePixels), 1u, all);
+        wave.samples = samples * std::clamp(size_ / (samples * kTilePixels * all), 1u, waves_.iterations_together);
     }
     film_wave = wave;
     film_wave.tiles = all;
@@ -73,9 +97,7 @@ void WavePlan::shape_preferred(uint64_t bytes_per_path, uint64_t room) {
     const uint32_t size =
         device_wave_size(scene_, settings_, plateau, bytes_per_path, settings_.memory ? room : room / 2);
     const bool whole = film_wide_ && !streams();
-    const uint64_t film = uint64_t(tile_count(shape_wave(scene_, 0, size, 1))) * kTilePixels *
-                          (whole_iterations_ ? waves_.iteration_samples : 1);
-    shape(whole ? uint32_t(std::max<uint64_t>(size, film)) : size);
+    shape(whole ? uint32_t(std::max<uint64_t>(size, slots_together())) : size);
 }
 
 bool WavePlan::fit(uint64_t room, const std::function<uint64_t()>& needed) {

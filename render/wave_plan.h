@@ -54,11 +54,14 @@ public:
     uint32_t light_subpaths(uint32_t tile) const;
     /// Light vertices that the queues of a wave have room for.
     uint32_t kept() const;
-    /// Light subpaths of an iteration.
-    uint64_t iteration_subpaths() const;
+    /// Light subpaths of the iterations that are done at once.
+    uint64_t light_subpaths_together() const;
     /// A wave of this shape had so many: plans for no fewer from now on.
     void keep(uint64_t vertices);
 
+    /// Decides how many iterations are done at once: as many as fill the machine, while `fits()` with all of them in a
+    /// wave of a device.
+    void choose_iterations(const std::function<bool()>& fits);
     /// The smallest wave that may be: what was set, where it was.
     void shape_least() { shape(least_size()); }
     /// A wave that does well, on a device in about `room` bytes of a budget, or in half of what is free without one.
@@ -70,6 +73,8 @@ public:
 private:
     /// A wave of `size` slots. Paths of streaming are many more than its slots, and always those of the whole film.
     void shape(uint32_t size);
+    /// Of the film, in all iterations that are done at once.
+    uint64_t slots_together() const;
     void shape_on_host();
     void shape_on_device();
     void check_numbers() const;
@@ -100,6 +105,8 @@ Wave host_wave(const Scene& scene, const RenderSettings& settings, uint32_t thre
 constexpr uint32_t kWavePlateau = 1u << 26;
 /// With light vertices, which take half a kilobyte each beside.
 constexpr uint32_t kFilmWidePlateau = 1u << 25;
+/// Where iterations have a number of samples of their own, as many of them are done at once as have so many paths.
+constexpr uint32_t kIterationsPlateau = 1u << 22;
 /// Slots of streaming: twice as many bring 3 to 8 %, but it is there to need little memory.
 constexpr uint32_t kStreamPlateau = 1u << 23;
 

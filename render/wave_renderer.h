@@ -25,9 +25,11 @@ public:
             const HostTracer tracer = backend_.find_structure(accels);
             if constexpr (requires { Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed); })
                 maker_.plan.mean = Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed);
-            plan_.shape_least();
-            if constexpr (AppendedState<State>)
-                maker_.appended = planned_light_vertices(plan_.mean, plan_.iteration_subpaths());
+            plan_.choose_iterations([&] {
+                plan_appended();
+                return needed_bytes(true) + fixed_bytes(maker_.state_bytes()) <= spare(backend_.room(0));
+            });
+            plan_appended();
             if (settings.memory > 0 && needed_bytes(true) + fixed_bytes(maker_.state_bytes()) > settings.memory)
                 refuse(needed_bytes(true), true);
             backend_.upload(accels);
@@ -131,6 +133,12 @@ public:
     }
 
 private:
+    /// Of room that nobody has set a budget for, a half.
+    uint64_t spare(uint64_t room) const { return maker_.settings.memory ? room : room / 2; }
+    void plan_appended() {
+        if constexpr (AppendedState<State>)
+            maker_.appended = planned_light_vertices(plan_.mean, plan_.light_subpaths_together());
+    }
     /// Scene, structure, state, and what the backend has beside.
     uint64_t fixed_bytes(uint64_t state) const {
         return backend_.scene_bytes().total() + backend_.accel_bytes() + state + backend_.other_bytes();

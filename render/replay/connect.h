@@ -30,26 +30,27 @@ struct ReplayConnections {
         uint32_t next = source.first(0), found = search.find(next);
         if (found == kNone) return;
         const SubpathEnd<Mis> end = packed_end();
-        for (; found != kNone; found = search.find(next)) pair(end, found);
+        for (; found != kNone; found = search.find(next)) pair(search.draw(found), end, found);
     }
     void all_backwards(const SubpathEnd<Mis>& end) const {
         for (uint32_t i = source.vertices.counter->size(); i-- > 0;)
             if (path.depth + source.vertices.items.load_front(i).bits.depth() + 1 <= eye.ctx.rules.max_depth)
-                pair(end, i);
+                pair(source, end, i);
     }
     void all_forwards(const SubpathEnd<Mis>& end) const {
-        for (uint32_t i = 0; i < source.vertices.counter->size(); ++i) pair(end, i);
+        for (uint32_t i = 0; i < source.vertices.counter->size(); ++i) pair(source, end, i);
     }
 
 private:
-    void pair(const SubpathEnd<Mis>& end, uint32_t place) const {
+    template <class Draw>
+    void pair(const Draw& draw, const SubpathEnd<Mis>& end, uint32_t place) const {
         const auto& ctx = eye.ctx;
         const ConnectionVertex<Mis> light = load_vertex<kReplayFeatures>(source.vertices, place);
         CandidateItem item;
         bool pushed = false;
         DropWatch watch;
         ReplayDrop drop;
-        push_connection<kReplayFeatures>(ctx.view, ctx.rules, source, state, eye.numbers, end, 0, light, place, true,
+        push_connection<kReplayFeatures>(ctx.view, ctx.rules, draw, state, eye.numbers, end, 0, light, place, true,
                                          LastItem<CandidateItem>{&item, &pushed}, watch.record());
         const bool dropped = watch.dropped("connect_vertices", drop);
         if (!pushed && !dropped) return;

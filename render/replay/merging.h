@@ -51,9 +51,8 @@ inline void keep_light_subpath(const ReplayContext<MergingMis>& ctx, const VcmPo
                                                 hit.queue(),
                                                 {merge.queue(), connection.queue().items, &key},
                                                 ctx.rules.mis.now,
-                                                policy.vcm.samples,
-                                                policy.waves.light_rounds(),
-                                                policy.table_bits,
+                                                policy.numbers(),
+                                                policy.keys,
                                                 policy.rules.connect,
                                                 policy.keeps_first(),
                                                 nullptr};
@@ -71,10 +70,11 @@ inline void keep_light_subpath(const ReplayContext<MergingMis>& ctx, const VcmPo
 class ReplayIteration {
 public:
     /// `subpaths`: numbers of a sample.
-    ReplayIteration(const VcmPolicy& policy, uint32_t first_sample, uint32_t subpaths,
+    ReplayIteration(VcmPolicy policy, uint32_t first_sample, uint32_t subpaths,
                     std::vector<std::vector<KeptVertex>> kept)
-        : first_sample_(first_sample), subpaths_(subpaths), samples_(policy.vcm.samples),
-          source_{{}, policy.cache_draws, policy.subpaths()} {
+        : first_sample_(first_sample), subpaths_(subpaths), samples_(policy.vcm.samples) {
+        policy.waves.iterations_together = 1;
+        wave_.iteration = first_sample / policy.vcm.samples;
         uint64_t count = 0;
         for (const auto& part : kept) count += part.size();
         const StateSize size = {uint32_t(count), host_primitive_bytes()};
@@ -84,7 +84,7 @@ public:
         Layout layout(plan, memory_.data());
         state_ = VcmState::lay_out(layout, policy, size);
         state_.all.merges.counter->count = state_.all.merges.counter->capacity = size.appended;
-        source_.vertices = state_.drawn();
+        source_ = VcmSource::of(state_, &wave_, policy);
         uint32_t place = 0;
         for (auto& part : kept) {
             for (const KeptVertex& v : part) put(place++, v);
@@ -92,7 +92,7 @@ public:
         }
         CpuWholeExecutor exec;
         StageRecord record{};
-        exec.sort_pairs(state_.order, size.appended, kMergeKeyShift + state_.table_bits, &record);
+        exec.sort_pairs(state_.order, size.appended, state_.key_bits(), &record);
         exec.for_each(FindCells{state_, &record}, size.appended + 1);
         exec.for_each(PlaceVertices{state_, &record}, size.appended);
     }
@@ -102,8 +102,7 @@ public:
     const VcmSource& source() const { return source_; }
     uint32_t size() const { return state_.all.merges.counter->count; }
     void name_owner(uint32_t place, ReplayCandidate& c) const {
-        const uint32_t subpath =
-            uint32_t(state_.order.keys[1][place] >> kMergeDepthBits) & ((1u << kMergeSubpathBits) - 1);
+        const uint32_t subpath = state_.keys.subpath(state_.order.keys[1][place]);
         c.light_subpath = subpath % subpaths_;
         if (samples_ > 1) c.light_sample = first_sample_ + subpath / subpaths_;
     }
@@ -119,6 +118,7 @@ private:
     uint32_t first_sample_, subpaths_, samples_;
     HostMemory memory_;
     VcmState state_;
+    WaveState wave_{};  ///< of the iteration
     VcmSource source_;
 };
 
@@ -140,7 +140,7 @@ inline void replay_merges(ReplayEye<MergingMis>& eye, const ReplayIteration& lig
         const float radius = ctx.rules.mis.now->radius;
         const size_t before = eye.out.candidates.size();
         MergeSum<kReplayFeatures> sum = {ctx.view, ctx.rules, z, path};
-        NearVertices near = {lights.state(), MergeGrid::of(ctx.view, radius), z.point.p, radius};
+        NearVertices near = {lights.state(), MergeGrid::of(ctx.view, radius), 0, z.point.p, radius};
         for (uint32_t k; (k = near.next()) != kNone;) {
             const MergeVertex y = lights.state().sorted.load(k);
             MergeFound found;

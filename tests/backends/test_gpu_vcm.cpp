@@ -59,6 +59,18 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("Iterations that a device does at once leave the bits of one after the other") {
+    if (!device()) return;
+    for (const char* integrator : {"vcm", "sppm"})
+        for (const char* alpha : {"0.75", "1"}) {
+            INFO(integrator << ", merge_alpha " << alpha);
+            const Scene scene = project_scene("cornell", 64, 48);
+            RenderSettings s = merging(scene, integrator);
+            apply_setting(s, "merge_alpha", alpha);
+            check_on_device(scene, s, 150);
+        }
+}
+
 TEST_CASE("vcm with more eye vertices than merge in the order in which they come: CPU and CUDA agree") {
     if (!device()) return;
     const Scene scene = project_scene("glass", 256, 192);

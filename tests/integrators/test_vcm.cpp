@@ -3,6 +3,7 @@
 // Integrators that merge: closed forms, the mean of the path tracer, and that no thread, wave or budget decides a bit.
 #include <cmath>
 
+#include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
 #include "tests/support/whole_iterations.h"
@@ -163,6 +164,28 @@ TEST_CASE("All that merge: the same bits for any number of threads, size of wave
         apply_setting(s, "merge_samples", samples);
         INFO(integrator << ", " << samples << " samples an iteration");
         check_bits_on_cpu(scene, s, 4, 64);
+    }
+}
+
+TEST_CASE("Iterations that are done at once have one radius, and leave the same bits as one after the other") {
+    for (uint32_t i = 0; i < 16; ++i) CHECK(RadiusStep::of(i).first == i);
+    for (uint32_t i = 0; i < 5000; ++i) {
+        const RadiusStep step = RadiusStep::of(i);
+        CHECK((step.first <= i && i < step.end() && RadiusStep::of(step.end()).first == step.end()));
+        CHECK(step.count <= std::max(i / 8, 1u));
+    }
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const auto& [samples, alpha] : {std::pair("1", "0.75"), {"3", "0.75"}, {"3", "1"}}) {
+        INFO("merge_samples=" << samples << " merge_alpha=" << alpha);
+        RenderSettings s = vcm_settings(scene, "0.02");
+        apply_setting(s, "merge_samples", samples);
+        apply_setting(s, "merge_alpha", alpha);
+        const RenderResult together = render_on(3, scene, s, 75);
+        const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
+        const uint32_t k = renderer->iteration_samples();
+        for (uint32_t i = 0; i < 75; i += k) renderer->render(i, k);
+        CHECK(renderer->film().sum == together.film.sum);
+        CHECK(renderer->film().sum_squares == together.film.sum_squares);
     }
 }
 

@@ -187,7 +187,7 @@ TEST_CASE("waves of a device hold all samples of an iteration, for as many tiles
         CHECK(plan.film_wave.samples == 4);
         CHECK(plan.in_parts() == (tiles < 15));
         CHECK(plan.light_subpaths(0) == tiles * kTilePixels);
-        CHECK(plan.iteration_subpaths() == 4 * 40 * 24);
+        CHECK(plan.light_subpaths_together() == 4 * 40 * 24);
         CHECK(waves.multi_bounce_below == tiles * kTilePixels * 4 / 16);
     }
     s.wave_size = 1024;
@@ -223,6 +223,48 @@ TEST_CASE("waves of a device hold all samples of an iteration, for as many tiles
     s.memory = 1u << 30;
     one.shape_preferred(100, 100 * 960 * 6);
     CHECK(one.wave.samples == 6);
+}
+
+TEST_CASE(
+    "as many iterations are done at once as fill the machine, for which there is memory, and which were asked for") {
+    const Scene scene = plain_film();  // 960 slots
+    RenderSettings s;
+    WavePolicy waves = light_policy(2);
+    const auto all = [] { return true; };
+    const auto choose = [&](uint32_t threads, uint32_t most, const std::function<bool()>& fits) {
+        waves.iterations_together = most;
+        WavePlan plan(scene, s, waves, true, threads, true);
+        plan.choose_iterations(fits);
+        CHECK(plan.light_subpaths_together() == uint64_t(waves.iterations_together) * 2 * 40 * 24);
+        return waves.iterations_together;
+    };
+    CHECK(choose(0, 1, all) == 1);
+    CHECK(choose(0, 64, all) == 64);
+    CHECK(choose(0, 1u << 16, all) == kIterationsPlateau / 1920);
+    CHECK(choose(1, 64, all) == 1);
+    CHECK(choose(4, 64, all) == 4 * 4 * kHostWaveSize / 1920);
+    CHECK(choose(0, 64, [&] { return waves.iterations_together <= 20; }) == 16);
+    CHECK(choose(0, 64, [] { return false; }) == 1);
+    s.expected_samples = 10;
+    CHECK(choose(0, 64, all) == 5);
+    s.expected_samples = 0;
+
+    waves.iterations_together = 64;
+    WavePlan plan(scene, s, waves, true, 0, true);
+    plan.choose_iterations(all);
+    plan.shape_preferred(100, 1u << 30);
+    CHECK(plan.wave.samples == 128);
+    CHECK(plan.film_wave.samples == 128);
+    CHECK_FALSE(plan.in_parts());
+    // With less room there are fewer, and then less of the film.
+    CHECK(plan.fit(7 * 1920, [&] { return uint64_t(plan.wave.slot_count()); }));
+    CHECK(plan.wave.samples == 14);
+    CHECK_FALSE(plan.in_parts());
+    CHECK(plan.fit(1000, [&] { return uint64_t(plan.wave.slot_count()); }));
+    CHECK(plan.wave.samples == 2);
+    CHECK(plan.wave.tiles == 7);
+    s.wave_size = 5000;
+    CHECK(choose(0, 64, all) == 2);
 }
 
 TEST_CASE("waves of a host are small, and those of light that lands anywhere hold one sample") {

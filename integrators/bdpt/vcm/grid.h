@@ -1,8 +1,10 @@
 // Where the light vertices of an iteration lie: cells of twice the radius, of which a hash table holds the starts.
 #pragma once
 
+#include <bit>
+
+#include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/bdpt/vcm/merging_mis.h"
-#include "integrators/bdpt/vcm/settings.h"
 #include "integrators/kept_state.h"
 #include "stages/vertex_queues.h"
 
@@ -59,15 +61,6 @@ struct MergeGrid {
     }
 };
 
-/// Keys put light vertices in order of their place in the table, light subpath and depth: an order that knows nothing
-/// of waves and threads, so that sums over a cell have the same bits for any number of them.
-constexpr uint32_t kMergeDepthBits = 11, kMergeSubpathBits = 29, kMergeKeyShift = kMergeDepthBits + kMergeSubpathBits;
-constexpr uint32_t kLeastMergeBits = 8, kMostMergeBits = 24;  ///< of the table
-AMBILUX_HD uint64_t merge_key(uint32_t hash, uint32_t subpath, uint32_t depth) {
-    return uint64_t(hash) << kMergeKeyShift | uint64_t(subpath) << kMergeDepthBits |
-           (depth & ((1u << kMergeDepthBits) - 1));
-}
-
 /// Light vertices: as merges see them and, where subpaths are connected, as connections do.
 struct VcmVertices {
     Queue<MergeVertex> merges;
@@ -84,8 +77,8 @@ struct VcmVertices {
     }
 };
 
-/// What lives as long as an iteration: the light vertices of all its waves. Nothing outlives it, and the radius follows
-/// from its number.
+/// What lives as long as iterations that are done at once: the light vertices of all their waves. Nothing outlives
+/// them, and the radius follows from their number.
 struct VcmState {
     static constexpr StateKind kKind = StateKind::by_index;
 
@@ -93,8 +86,9 @@ struct VcmState {
     LaneArray<MergeVertex> sorted;  ///< in the order of keys
     LaneArray<ConnectionVertex<MergingMis>> sorted_connections;
     SortMemory<uint64_t> order;  ///< keys and places
-    uint32_t* starts;            ///< in the order of keys: of each place in the table, and the end
-    uint32_t table_bits;
+    uint32_t* starts;            ///< in the order of keys: of each place in the tables of all iterations, and the end
+    uint32_t places;             ///< in these tables
+    MergeKeys keys;
     uint32_t lanes;  ///< of a vertex for connections
 
     template <class Policy>
@@ -106,11 +100,13 @@ struct VcmState {
         s.sorted_connections = layout.array<ConnectionVertex<MergingMis>>(p.rules.connect ? n : 0, p.vertex_lanes);
         s.order = SortMemory<uint64_t>::lay_out(layout, n, size.primitives);
         s.all.keys = s.order.keys[0];
-        s.starts = layout.allocate<uint32_t>((uint64_t(1) << p.table_bits) + 1);
-        s.table_bits = p.table_bits;
+        s.places = p.waves.iterations_together << p.keys.table_bits;
+        s.starts = layout.allocate<uint32_t>(uint64_t(s.places) + 1);
+        s.keys = p.keys;
         s.lanes = p.vertex_lanes;
         return s;
     }
+    uint32_t key_bits() const { return keys.shift() + uint32_t(std::bit_width(places - 1)); }
     /// The vertices in order, for connections that draw from them.
     AMBILUX_HD Queue<ConnectionVertex<MergingMis>> drawn() const {
         Queue<ConnectionVertex<MergingMis>> q;
@@ -137,14 +133,15 @@ struct VcmState {
 struct NearVertices {
     const VcmState& state;
     MergeGrid grid;
+    uint32_t iteration;  ///< of those that are done at once
     Vec3f p;
     float radius;
     MergeCell first;
     uint32_t cells = 0;  ///< that were begun, of eight
     uint32_t place = 0, end = 0;
 
-    AMBILUX_HD NearVertices(const VcmState& s, const MergeGrid& g, Vec3f center, float r)
-        : state(s), grid(g), p(center), radius(r), first(g.first_cell(center)) {}
+    AMBILUX_HD NearVertices(const VcmState& s, const MergeGrid& g, uint32_t i, Vec3f center, float r)
+        : state(s), grid(g), iteration(i), p(center), radius(r), first(g.first_cell(center)) {}
 
     /// The next, or kNone after the last. One loop over cells and their vertices: threads of a warp that begin a cell
     /// do not wait for those that look at vertices.
@@ -155,9 +152,9 @@ struct NearVertices {
                 const Vec3f q = state.sorted.load_front(i).p;
                 if (length_squared(q - p) <= sqr(radius) && grid.cell(q) == cell(cells - 1)) return i;
             } else {
-                const uint32_t hash = cell(cells++).hash(state.table_bits);
-                place = state.starts[hash];
-                end = state.starts[hash + 1];
+                const uint32_t at = state.keys.place(iteration, cell(cells++).hash(state.keys.table_bits));
+                place = state.starts[at];
+                end = state.starts[at + 1];
             }
         }
         return kNone;

@@ -76,27 +76,23 @@ struct VcmIntegrator {
             return p;
         }
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& state, const Policy& p)
-            : two_sides(parts, p, m.two_sides, VcmSource{state.drawn(), p.cache_draws, p.subpaths()}),
-              keeps(p.keeps_vertices) {
+            : two_sides(parts, p, m.two_sides, VcmSource::of(state, parts.wave.state, p)), keeps(p.keeps_vertices) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
             const auto& hits = m.two_sides.subpaths.hits;
             set_radius = {parts.wave.state, m.now, p.first_radius, p.vcm.alpha, p.subpaths(), record(set_radius)};
             for (int k = 0; k < 2; ++k) {
-                keep[k] = {scene,
-                           parts.wave,
-                           p.rules,
-                           hits[k],
-                           m.kept,
-                           m.now,
-                           p.vcm.samples,
-                           p.waves.light_rounds(),
-                           state.table_bits,
-                           p.rules.connect,
-                           p.keeps_first(),
-                           record(keep[k])};
-                order[k] = {scene, hits[k], {m.queries, hits[k].counter}, record(order[k])};
-                merge[k] = {scene, parts.wave, p.rules, hits[k], state, two_sides.eye.accumulate, record(merge[k])};
+                keep[k] = {scene,       parts.wave, p.rules,         hits[k],         m.kept,         m.now,
+                           p.numbers(), p.keys,     p.rules.connect, p.keeps_first(), record(keep[k])};
+                order[k] = {scene,
+                            parts.wave,
+                            p.numbers(),
+                            hits[k],
+                            {m.queries, hits[k].counter},
+                            QueryOrder::kPlaceBits + uint32_t(std::bit_width(p.waves.iterations_together - 1)),
+                            record(order[k])};
+                merge[k] = {scene,           parts.wave, p.rules, p.numbers(), hits[k], state, two_sides.eye.accumulate,
+                            record(merge[k])};
             }
             append = {m.kept, state, record(append)};
             sort = parts.layout.record("sort_vertices");
@@ -111,7 +107,7 @@ struct VcmIntegrator {
         run.once([](auto& exec, const Stages& s) {
             if (!s.keeps) return;
             const uint32_t count = exec.count(s.append.state.all.merges);
-            exec.sort_pairs(s.append.state.order, count, kMergeKeyShift + s.append.state.table_bits, s.sort);
+            exec.sort_pairs(s.append.state.order, count, s.append.state.key_bits(), s.sort);
             exec.for_each(s.find, count + 1);
             exec.for_each(s.place, count);
         });
@@ -155,7 +151,7 @@ private:
             exec.for_each(merge, merge.hits);
         } else {
             exec.for_each(order, merge.hits);
-            exec.sort_pairs(order.order.sort, merge.hits, QueryOrder::kBits, merge.record, QueryOrder::kLeast);
+            exec.sort_pairs(order.order.sort, merge.hits, order.bits, merge.record, QueryOrder::kLeast);
             exec.for_each(MergeInOrder<F>{merge, order.order, merge.record}, merge.hits);
         }
     }

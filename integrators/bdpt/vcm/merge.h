@@ -49,6 +49,7 @@ struct Merge {
     SceneView scene;
     Wave wave;
     Rules<Mis> rules;
+    IterationNumbers numbers;
     Queue<HitItem<typename Items::Ray>> hits;
     VcmState state;
     Accumulate samples;
@@ -60,7 +61,8 @@ struct Merge {
             if (path.depth == 1 && !rules.mis.merges_first) return;
             const float radius = rules.mis.now->radius;
             MergeSum<F> sum = {scene, rules, z, path};
-            NearVertices near = {state, MergeGrid::of(scene, radius), z.point.p, radius};
+            NearVertices near = {state, MergeGrid::of(scene, radius), numbers.iteration(wave, hit.ray.path), z.point.p,
+                                 radius};
             for (uint32_t k; (k = near.next()) != kNone;) {
                 const MergeVertex y = state.sorted.load(k);
                 MergeFound m;

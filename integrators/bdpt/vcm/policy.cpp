@@ -13,7 +13,7 @@
 namespace ambilux {
 
 VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
-    VcmPolicy p{plan_bdpt<MergingMis>(scene, settings), VcmSettings::plan(settings), kLeastMergeBits, 0};
+    VcmPolicy p{plan_bdpt<MergingMis>(scene, settings), VcmSettings::plan(settings)};
     p.rules.mis.merges = variant_of(settings).traits.merges;
     p.rules.mis.merges_first = p.vcm.first;
     p.rules.directions.deltas_only = !p.rules.mis.competes();
@@ -24,18 +24,22 @@ VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
     p.one_connection_per_launch |= p.cache_draws == 1;
     const uint64_t keys =
         uint64_t(scene.sensor.crop_width) * scene.sensor.crop_height * p.waves.light_rounds() * p.vcm.samples;
-    if (keys > uint64_t(1) << kMergeSubpathBits)
+    p.keys = {uint32_t(std::bit_width(p.rules.max_depth)), std::max(1u, uint32_t(std::bit_width(keys - 1))),
+              MergeKeys::kLeastTableBits};
+    if (p.keys.subpath_bits > MergeKeys::kMostSubpathBits)
         throw Error(ExitCode::usage,
                     fmt::format("merge_samples={}: light subpaths of an iteration are numbered up to {}, and a film of "
                                 "{}x{} has {}; choose fewer samples in an iteration",
-                                p.vcm.samples, uint64_t(1) << kMergeSubpathBits, scene.sensor.crop_width,
+                                p.vcm.samples, uint64_t(1) << MergeKeys::kMostSubpathBits, scene.sensor.crop_width,
                                 scene.sensor.crop_height, keys));
     return p;
 }
 
 void VcmPolicy::size_table(double mean_vertices) {
     const uint64_t vertices = uint64_t(std::max(mean_vertices * double(subpaths()), 1.0));
-    table_bits = std::clamp(uint32_t(std::bit_width(vertices)), kLeastMergeBits, kMostMergeBits);
+    keys.table_bits =
+        std::clamp(uint32_t(std::bit_width(vertices)), MergeKeys::kLeastTableBits, MergeKeys::kMostTableBits);
+    waves.iterations_together = 1u << (MergeKeys::kMostTableBits - keys.table_bits);
 }
 
 }  // namespace ambilux

@@ -2,6 +2,8 @@
 #pragma once
 
 #include "integrators/bdpt/shared/policy.h"
+#include "integrators/bdpt/shared/subpath_number.h"
+#include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/bdpt/vcm/merging_mis.h"
 #include "integrators/bdpt/vcm/settings.h"
 
@@ -9,7 +11,7 @@ namespace ambilux {
 
 struct VcmPolicy : BdptPolicyOf<MergingMis> {
     VcmSettings vcm;
-    uint32_t table_bits;    ///< of the grid's hash table
+    MergeKeys keys;
     float first_radius;     ///< of the first iteration
     uint32_t vertex_lanes;  ///< of a light vertex, as kernels of these features use them
 
@@ -17,10 +19,15 @@ struct VcmPolicy : BdptPolicyOf<MergingMis> {
     bool keeps_first() const { return rules.mis.competes() || !rules.next_event; }
     /// Light subpaths of an iteration.
     float subpaths() const { return rules.mis.light_subpaths * float(vcm.samples); }
+    IterationNumbers numbers() const { return {vcm.samples, waves.light_rounds()}; }
+    /// Iterations from `iteration` on that may be done at once.
+    uint32_t together(uint32_t iteration) const {
+        return vcm.alpha < 1.0f ? RadiusStep::of(iteration).end() - iteration : ~0u;
+    }
 
     /// Throws Error(usage) if light subpaths of an iteration are more than keys can number.
     static VcmPolicy plan(const Scene& scene, const RenderSettings& settings);
-    /// Chooses the table by the mean number of vertices that a light subpath leaves.
+    /// Chooses the table by the mean number of vertices that a light subpath leaves, and how many there may be.
     void size_table(double mean_vertices);
 };
 

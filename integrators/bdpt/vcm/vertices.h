@@ -9,7 +9,7 @@
 
 namespace ambilux {
 
-/// The radius of the iteration (Knaus and Zwicker 2011).
+/// The radius of the iterations at work (Knaus and Zwicker 2011).
 struct SetRadius {
     static constexpr const char* kName = "set_radius";
 
@@ -21,7 +21,7 @@ struct SetRadius {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t) const {
-        const float r = first * powf(float(state->iteration + 1), 0.5f * (alpha - 1.0f));
+        const float r = first * powf(float(RadiusStep::of(state->iteration).first + 1), 0.5f * (alpha - 1.0f));
         *now = {r, kPi * r * r * light_subpaths};
     }
 };
@@ -50,9 +50,8 @@ struct KeepVertices {
     Queue<HitItem<typename Items::Ray>> hits;
     VcmVertices kept;
     const MergeNow* now;
-    uint32_t samples;  ///< of an iteration
-    uint32_t rounds;   ///< light subpaths of a pixel, at most
-    uint32_t table_bits;
+    IterationNumbers numbers;
+    MergeKeys keys;
     bool connects;
     bool keeps_first;  ///< else next event estimation finds what arrives from emitters, beams excepted
     StageRecord* record;
@@ -74,8 +73,9 @@ private:
                                                  y.sums.dvc,
                                                  y.sums.dvm});
         if (place >= kept.merges.capacity()) return;
-        const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(table_bits);
-        kept.keys[place] = merge_key(cell, light_subpath_number(wave, slot, samples, rounds), path.depth);
+        const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(keys.table_bits);
+        kept.keys[place] =
+            keys.key(keys.place(numbers.iteration(wave, slot), cell), numbers.light_subpath(wave, slot), path.depth);
         if (!connects) return;
         const auto vertex = pack_connection_vertex(y, path, kNone);
         kept.connections.store(place, vertex, lanes_of<F>(vertex));
@@ -102,7 +102,7 @@ struct AppendVertices {
     }
 };
 
-/// Where the vertices of each place in the table start, once keys are sorted. Over one item more than there are.
+/// Where the vertices of each place in the tables start, once keys are sorted. Over one item more than there are.
 struct FindCells {
     static constexpr const char* kName = "find_cells";
 
@@ -111,10 +111,10 @@ struct FindCells {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const uint64_t* keys = state.order.keys[1];
-        const uint32_t count = state.all.merges.counter->size(), end = 1u << state.table_bits;
-        const uint32_t first = i > 0 ? uint32_t(keys[i - 1] >> kMergeKeyShift) + 1 : 0;
-        const uint32_t last = i < count ? uint32_t(keys[i] >> kMergeKeyShift) : end;
-        for (uint32_t cell = first; cell <= last; ++cell) state.starts[cell] = i;
+        const uint32_t count = state.all.merges.counter->size();
+        const uint32_t first = i > 0 ? state.keys.place(keys[i - 1]) + 1 : 0;
+        const uint32_t last = i < count ? state.keys.place(keys[i]) : state.places;
+        for (uint32_t place = first; place <= last; ++place) state.starts[place] = i;
     }
 };
 

@@ -59,10 +59,10 @@ struct VplIntegrator {
             const Wave& wave = parts.wave;
             const Rules<Mis> rules = p.light_rules();
             const auto& q = m.two_sides.subpaths;
-            const SubpathOrder order = {p.vpl.samples, p.waves.light_rounds()};
+            const IterationNumbers numbers = {p.vpl.samples, p.waves.light_rounds()};
             StageRecord* const generates = record(generate.kName);
             generate = {{scene, wave, p.rules, q.rays[0], {}, nullptr, generates, p.waves.light_subpaths_per_tile},
-                        order,
+                        numbers,
                         p.vpl.subpaths,
                         generates};
             for (int k = 0; k < 2; ++k) {
@@ -75,7 +75,7 @@ struct VplIntegrator {
                                    q.rays[1 - k],
                                    {},
                                    nullptr,
-                                   {m.kept, wave, order},
+                                   {m.kept, wave, numbers},
                                    record(light_vertex[k].kName)};
             }
             append = {m.kept, state, record(append.kName)};

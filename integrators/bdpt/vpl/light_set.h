@@ -51,16 +51,6 @@ struct VplState {
     }
 };
 
-/// Where a light subpath of an iteration stands in it.
-struct SubpathOrder {
-    uint32_t samples;  ///< of an iteration
-    uint32_t rounds;   ///< light subpaths of a slot, at most
-
-    AMBILUX_HD uint32_t number(const Wave& wave, uint32_t slot) const {
-        return light_subpath_number(wave, slot, samples, rounds);
-    }
-};
-
 /// The first `subpaths` light subpaths that an iteration's slots have room for.
 template <Features F>
 struct GenerateSet {
@@ -68,12 +58,12 @@ struct GenerateSet {
     static constexpr const char* kName = Generate::kName;
 
     Generate generate;
-    SubpathOrder order;
+    IterationNumbers numbers;
     uint32_t subpaths;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
-        if (order.number(generate.wave, slot) < subpaths) generate(slot);
+        if (numbers.light_subpath(generate.wave, slot) < subpaths) generate(slot);
     }
 };
 
@@ -82,11 +72,11 @@ template <Features F>
 struct KeepVertex {
     LightVertices<VplMis> vertices;
     Wave wave;
-    SubpathOrder order;
+    IterationNumbers numbers;
 
     AMBILUX_HD void at(const SceneView&, const Rules<VplMis>&, const Vertex<VplMis>& y, const Subpath<VplMis>& path,
                        uint32_t slot, const RandomNumbers&) const {
-        push_vertex<F>(vertices, pack_connection_vertex(y, path, order.number(wave, slot)));
+        push_vertex<F>(vertices, pack_connection_vertex(y, path, numbers.light_subpath(wave, slot)));
     }
 };
 
