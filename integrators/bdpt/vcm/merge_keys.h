@@ -13,6 +13,7 @@ namespace ambilux {
 struct MergeKeys {
     static constexpr uint32_t kLeastTableBits = 8, kMostTableBits = 24;  ///< the most: of all tables together
     static constexpr uint32_t kMostSubpathBits = 29;
+    static constexpr uint32_t kMostIterationBits = 7;  ///< at once: keys of queries (query_order.h) have 31 bits
 
     uint32_t depth_bits, subpath_bits;
     uint32_t table_bits;  ///< of one iteration

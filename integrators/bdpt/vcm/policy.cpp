@@ -39,7 +39,8 @@ void VcmPolicy::size_table(double mean_vertices) {
     const uint64_t vertices = uint64_t(std::max(mean_vertices * double(subpaths()), 1.0));
     keys.table_bits =
         std::clamp(uint32_t(std::bit_width(vertices)), MergeKeys::kLeastTableBits, MergeKeys::kMostTableBits);
-    waves.iterations_together = 1u << (MergeKeys::kMostTableBits - keys.table_bits);
+    waves.iterations_together =
+        1u << std::min(MergeKeys::kMostTableBits - keys.table_bits, MergeKeys::kMostIterationBits);
 }
 
 }  // namespace ambilux

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "integrators/bdpt/shared/subpath_number.h"
+#include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/bdpt/vcm/merging_mis.h"
 #include "queues/primitives.h"
 #include "queues/stage_record.h"
@@ -13,6 +14,7 @@ namespace ambilux {
 /// threads read the same light vertices. Below kLeast they stay as they are.
 struct QueryOrder {
     static constexpr uint32_t kLeast = 1u << 15, kAxisBits = 8, kPlaceBits = 3 * kAxisBits;
+    static_assert(kPlaceBits + MergeKeys::kMostIterationBits < 32);
 
     SortMemory<uint32_t> sort;
     const QueueCounter* queries;
