@@ -25,6 +25,16 @@ constexpr uint32_t vertex_words() {
         return ray_words<Sums>();
 }
 
+/// Words of sums that rays carry from their second one on: their first ray has what it starts with in the place of the
+/// others, Sums::kFirstRayWords.
+template <class Sums>
+constexpr uint32_t later_ray_words() {
+    if constexpr (requires { Sums::kFirstRayWords; })
+        return ray_words<Sums>() - Sums::kFirstRayWords;
+    else
+        return 0;
+}
+
 /// Whole lanes for words that have no place of their own in an item.
 template <uint32_t kWords>
 struct SumLanes {

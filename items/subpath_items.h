@@ -43,8 +43,10 @@ using PathRay = PathRayOf<UnidirectionalMis>;
 /// A ray of a bidirectional path tracer.
 template <class Mis>
 struct SubpathRay {
-    using Sums = PackedSums<3, ray_words<typename Mis::Sums>()>;
-    static_assert(std::is_same_v<typename Mis::Start, SubpathStart>);
+    /// 1: word 3 of the sums lies in the place of tmax, from the second ray on.
+    static constexpr uint32_t kLaterWords = later_ray_words<typename Mis::Sums>();
+    using Sums = PackedSums<3 + kLaterWords, ray_words<typename Mis::Sums>()>;
+    static_assert(std::is_same_v<typename Mis::Start, SubpathStart> && kLaterWords <= 1);
     static constexpr uint32_t kPairedLanes = 4;
 
     Vec3f origin;
@@ -52,7 +54,7 @@ struct SubpathRay {
     Vec3f direction;
     SubpathBits bits;
     Rgb throughput;
-    float tmax;              ///< of camera rays
+    float tmax;              ///< of camera rays; of later ones perhaps word 3 of the sums
     float sums_or_start[2];  ///< words 0 and 1 of the sums; first ray of a light subpath, which has no sums yet:
                              ///< SubpathStart::inv_pdf and direction
     uint32_t start;          ///< first rays: camera_distance (eye), prim (light) of SubpathStart
@@ -132,6 +134,8 @@ struct SubpathItems<Mis, true> {
                  0,
                  float_bits(sums.word[2]),
                  sums.more};
+        if constexpr (Ray::kLaterWords > 0)
+            if (p.depth > 1) r.tmax = sums.word[3];
         if (p.depth == 1 && side == Side::light) {
             r.sums_or_start[0] = p.start.inv_pdf;
             r.sums_or_start[1] = p.start.direction;
@@ -143,7 +147,8 @@ struct SubpathItems<Mis, true> {
         return r;
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
-        const typename Ray::Sums sums = {{r.sums_or_start[0], r.sums_or_start[1], bits_float(r.sum_or_start)}, r.more};
+        typename Ray::Sums sums = {{r.sums_or_start[0], r.sums_or_start[1], bits_float(r.sum_or_start)}, r.more};
+        if constexpr (Ray::kLaterWords > 0) sums.word[3] = r.bits.depth() > 1 ? r.tmax : 0.0f;
         Path p{};
         p.origin = r.origin;
         p.direction = r.direction;

@@ -12,7 +12,7 @@
 namespace ambilux {
 
 inline std::vector<ReplayNumber> named_sums(const MergingSums& s) {
-    return {{"dvcm", s.dvcm}, {"dvc", s.dvc}, {"dvm", s.dvm}};
+    return {{"dvcm", s.dvcm}, {"dvc", s.dvc}, {"dvm", s.dvm}, {"merge_area", s.area}};
 }
 
 /// A vertex that a light subpath leaves.
@@ -127,7 +127,7 @@ inline std::vector<ReplayNumber> merge_densities(const ReplayContext<MergingMis>
                                                  const MergeVertex& y) {
     const BsdfValue f =
         ctx.rules.directions.evaluate<kReplayFeatures>(z, -octahedral_decode(y.d), TransportMode::radiance);
-    return {{"distance_over_radius", length(y.front.p - z.point.p) / ctx.rules.mis.now->radius},
+    return {{"distance_over_radius", length(y.front.p - z.point.p) / ctx.rules.mis.radius(z.sums)},
             {"pdf_eye_sa", f.pdf_sa},
             {"pdf_eye_reverse_sa", f.pdf_reverse_sa}};
 }
@@ -137,10 +137,10 @@ inline void replay_merges(ReplayEye<MergingMis>& eye, const ReplayIteration& lig
     const auto& ctx = eye.ctx;
     const auto merge = [&](const Subpath<MergingMis>& path, const Vertex<MergingMis>& z) {
         if (path.depth == 1 && !ctx.rules.mis.merges_first) return;
-        const float radius = ctx.rules.mis.now->radius;
         const size_t before = eye.out.candidates.size();
         MergeSum<kReplayFeatures> sum = {ctx.view, ctx.rules, z, path};
-        NearVertices near = {lights.state(), MergeGrid::of(ctx.view, radius), 0, z.point.p, radius};
+        NearVertices near = {lights.state(), MergeGrid::of(ctx.view, ctx.rules.mis.now->radius), 0, z.point.p,
+                             ctx.rules.mis.radius(z.sums)};
         for (uint32_t k; (k = near.next()) != kNone;) {
             const MergeVertex y = lights.state().sorted.load(k);
             MergeFound found;

@@ -8,7 +8,8 @@
 namespace ambilux {
 
 inline test::OracleMerges merges_of(const MergingMis& mis) {
-    return {double(mis.eta()), mis.merges_first, !mis.beside()};
+    return {double(mis.now->eta), mis.merges_first, !mis.beside(), double(mis.largest_footprint),
+            double(mis.least_area)};
 }
 
 }  // namespace ambilux
@@ -23,6 +24,17 @@ TEST_CASE("Weights with merging equal those of all strategies enumerated, and su
     CHECK(seen.at("merges") > 10000);
     for (const char* kind : {"hit", "escape", "next event", "connection", "light tracing", "visible light"})
         CHECK(seen.at(std::string(kind) + ", perspective") >= 20);
+}
+
+TEST_CASE("The same where the radius is as large as a pixel at the first vertex of the eye subpath") {
+    const MergeNow now[] = {{0.01f, 0x1p-10f}, {0.1f, 1.0f}, {0.5f, 300.0f}};
+    const std::map<std::string, uint64_t> seen = compare_weights(0.03, [&](uint32_t i) {
+        MergingMis mis{settings(i), &now[i / 16 % 3], i / 48 % 2 == 0};
+        mis.largest_footprint = 0.04f;
+        mis.least_area = 0.01f;
+        return mis;
+    });
+    CHECK(seen.at("merges") > 5000);
 }
 
 TEST_CASE("Where merges are alone, their weights sum to one, and hits count where none is possible") {

@@ -217,4 +217,32 @@ TEST_CASE("The radius of merges in other units is the same radius") {
           Approx(mean_of(render_scene(scene, open, 2).film)).epsilon(1e-6));
     CHECK(mean_of(render_scene(scene, pixel, 2).film) != mean_of(render_scene(scene, open, 2).film));
     CHECK(bias_text(pixel).find("a radius of 1 pixels") != std::string::npos);
+    // An orthographic camera sees all places with pixels of one size: the largest footprint is twice that.
+    const Scene parallel = scene_from_text(
+        "<scene version='3.0.0'><sensor type='orthographic'><transform name='to_world'><scale value='2'/><lookat "
+        "origin='0,4,0' target='0,0,0' up='0,0,1'/></transform><film type='hdrfilm'><integer name='width' value='16'/>"
+        "<integer name='height' value='16'/></film></sensor><shape type='sphere'><bsdf type='diffuse'/></shape><shape "
+        "type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/><translate "
+        "y='-1'/></transform><bsdf type='diffuse'/></shape><emitter type='point'><point name='position' x='1' y='3' "
+        "z='1'/></emitter></scene>");
+    RenderSettings one = vcm_settings(parallel, "2"), each = vcm_settings(parallel, "2");
+    apply_setting(one, "merge_unit", "pixel");
+    apply_setting(each, "merge_unit", "footprint");
+    CHECK(mean_of(render_scene(parallel, each, 2).film) ==
+          Approx(mean_of(render_scene(parallel, one, 2).film)).epsilon(1e-5));
+    CHECK(bias_text(each).find("a radius of 2 pixels, each where it looks") != std::string::npos);
+}
+
+TEST_CASE("With a radius as large as each pixel all that merge have the mean of the path tracer") {
+    const Scene scene = project_scene("cornell", 24, 24);
+    const Mean path = mean_over_seeds(scene, cpu_settings(scene, Estimator::mis, 3), 64, 8);
+    for (const char* integrator : {"vcm", "bpm"}) {
+        INFO(integrator);
+        RenderSettings s = vcm_settings(scene, "0.5", integrator);
+        apply_setting(s, "merge_unit", "footprint");
+        const Mean merged = mean_over_seeds(scene, s, 16, 12);
+        CHECK(std::fabs(merged.value / path.value - 1) <
+              4.0 * std::hypot(merged.error, path.error) / path.value + 0.005);
+        CHECK(merged.error / path.value < 0.01);
+    }
 }

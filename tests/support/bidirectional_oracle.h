@@ -61,6 +61,9 @@ struct OracleMerges {
     double eta = 0;
     bool first = true;
     bool alone = false;
+    double largest_footprint =
+        0;  ///< radius; 0: disks are the same for all paths. Else smaller pixels have smaller ones
+    double least_area = 1;
 };
 
 namespace oracle {
@@ -248,6 +251,21 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
     return steps;
 }
 
+/// The disk of merges over the largest one: as the pixel's footprint at the vertex that the camera sees.
+inline double oracle_merge_area(const SceneView& scene, const OraclePath& path, const OracleMerges& merges) {
+    if (!(merges.largest_footprint > 0)) return 1;
+    const Sensor& sensor = scene.sensor;
+    const Vec3f d = -path.to_eye[path.k - 1];
+    double footprint = 0;
+    if (camera_delta_direction(sensor))
+        footprint = 1 / double(camera_pdf_position(sensor));
+    else
+        footprint = oracle::distance2(path.vertices[path.k - 1].point.p, path.camera_p) /
+                    double(camera_pdf_direction_sa<oracle::F>(sensor, camera_cosine<oracle::F>(sensor, d)));
+    return std::clamp(footprint / (double(kPi) * merges.largest_footprint * merges.largest_footprint),
+                      merges.least_area, 1.0);
+}
+
 /// Densities of all strategies for a path. `light_subpaths`: light subpaths per eye subpath of a pixel; `connections`:
 /// light subpaths that an eye vertex is connected with.
 inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePath& path, const OracleSteps& steps,
@@ -283,7 +301,7 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
     r.merges.assign(k, 0.0);
     for (uint32_t j = 1; j < k; ++j) {
         if (delta(j) || (j == k - 1 && !merges.first)) continue;
-        double p = merges.eta;
+        double p = merges.eta * oracle_merge_area(scene, path, merges);
         for (uint32_t i = 0; i < k; ++i) p *= (i <= j ? steps.light[i].value : 1) * (i >= j ? steps.eye[i].value : 1);
         r.merges[j] = p;
         if (merges.alone) r.group[0] = 0, r.density[0] = 0;

@@ -28,6 +28,12 @@ struct VcmIntegrator {
         if (!p.light_subpaths()) return 0.0;
         const float pixel = p.vcm.asks_pixels() ? pixel_radius<F>(scene, tracer) : 0.0f;
         p.first_radius = p.vcm.first_radius(scene.bounds_radius, pixel);
+        if (p.vcm.unit == RadiusUnit::footprint && !p.vcm.open_radius() && pixel < kInfinity) {
+            constexpr float kLeastFootprint = 0.01f;
+            p.rules.mis.largest_footprint = kLargestFootprint * pixel;
+            p.rules.mis.least_area =
+                fminf(sqr(fmaxf(kLeastFootprint, kLeastRadius * scene.bounds_radius / p.first_radius)), 1.0f);
+        }
         const double mean = mean_light_vertices<F>(scene, tracer, p.rules, seed);
         if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = float(p.cache_draws / mean);
         p.size_table(mean);

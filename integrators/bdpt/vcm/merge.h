@@ -37,7 +37,7 @@ struct MergeSum {
         return true;
     }
     /// What `found` by light vertices adds to the sample.
-    AMBILUX_HD Rgb light(Rgb found) const { return path.throughput * found * (1.0f / rules.mis.eta()); }
+    AMBILUX_HD Rgb light(Rgb found) const { return path.throughput * found * (1.0f / rules.mis.eta(z.sums)); }
 };
 
 template <Features F>
@@ -59,10 +59,9 @@ struct Merge {
         const auto hit = hits.load(i);
         at_mergeable<F>(scene, rules, Side::eye, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& z) {
             if (path.depth == 1 && !rules.mis.merges_first) return;
-            const float radius = rules.mis.now->radius;
             MergeSum<F> sum = {scene, rules, z, path};
-            NearVertices near = {state, MergeGrid::of(scene, radius), numbers.iteration(wave, hit.ray.path), z.point.p,
-                                 radius};
+            NearVertices near = {state, MergeGrid::of(scene, rules.mis.now->radius),
+                                 numbers.iteration(wave, hit.ray.path), z.point.p, rules.mis.radius(z.sums)};
             for (uint32_t k; (k = near.next()) != kNone;) {
                 const MergeVertex y = state.sorted.load(k);
                 MergeFound m;

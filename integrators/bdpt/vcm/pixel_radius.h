@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "accel/host_tracer.h"
-#include "transport/mis/bidirectional.h"
+#include "integrators/bdpt/vcm/merging_mis.h"
 #include "transport/subpath/start.h"
 #include "transport/subpath/trace.h"
 
@@ -28,9 +28,8 @@ template <Features F>
             start_eye_subpath<F>(scene, mis, pixel % sensor.crop_width, pixel / sensor.crop_width, numbers, tmax);
         const Hit hit = end_of_ray<F>(scene, tracer, path, tmax, numbers);
         if (hit.prim == kNone) continue;
-        const float pdf = BidirectionalMis::camera_pdf<F>(sensor, camera_cosine<F>(sensor, path.direction));
-        const float distance = camera_delta_direction(sensor) ? 1.0f : hit.t + path.start.camera_distance;
-        radii.push_back(distance / sqrtf(kPi * pdf));
+        radii.push_back(
+            footprint_radius<F>(sensor, camera_cosine<F>(sensor, path.direction), hit.t + path.start.camera_distance));
     }
     if (radii.empty()) return kInfinity;
     const auto median = radii.begin() + radii.size() / 2;

@@ -22,9 +22,11 @@ std::vector<Declaration<VcmSettings>> fixed_radius() {
                         "first iteration, by default over the radius of the scene; 0: {} or that of a pixel at the "
                         "median of what is seen, whichever is less, over the root of merge_samples",
                         kUsualRadius)),
-        Of::choice("merge_unit", &VcmSettings::unit, {"scene", "world", "pixel"},
-                   "what merge_radius is measured in: radii of the scene, its own units, or radii of a pixel at the "
-                   "median of what is seen"),
+        Of::choice("merge_unit", &VcmSettings::unit, {"scene", "world", "pixel", "footprint"},
+                   fmt::format("what merge_radius is measured in: radii of the scene, its own units, radii of a pixel "
+                               "at the median of what is seen, or radii of a pixel where the eye subpath has its "
+                               "first vertex, those beyond {} times the median as there",
+                               kLargestFootprint)),
         Of::number("merge_samples", &VcmSettings::samples, 1u, 1024u,
                    "samples of every pixel in one iteration: they share light vertices and radius")};
 }
@@ -65,7 +67,7 @@ VcmSettings VcmSettings::plan(const RenderSettings& settings) {
 }
 
 float VcmSettings::first_radius(float scene, float pixel) const {
-    const float units[] = {scene, 1.0f, pixel};
+    const float units[] = {scene, 1.0f, pixel, kLargestFootprint * pixel};
     const float asked = open_radius() ? std::min(pixel, kUsualRadius * scene) / std::sqrt(float(samples))
                                       : radius * units[uint32_t(unit)];
     return std::clamp(asked, kLeastRadius * scene, scene);
@@ -73,7 +75,7 @@ float VcmSettings::first_radius(float scene, float pixel) const {
 
 std::string MergingVariant::bias(const RenderSettings& settings) {
     const VcmSettings s = VcmSettings::plan(settings);
-    const char* const units[] = {" of the scene's", " units of the scene", " pixels"};
+    const char* const units[] = {" of the scene's", " units of the scene", " pixels", " pixels, each where it looks"};
     const std::string radius = s.open_radius() ? fmt::format("a radius of at most {:.3g} of the scene's",
                                                              kUsualRadius / std::sqrt(float(s.samples)))
                                                : fmt::format("a radius of {:.3g}{}", s.radius, units[uint32_t(s.unit)]);
