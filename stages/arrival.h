@@ -213,13 +213,18 @@ struct Accumulate {
     AMBILUX_HD void operator()(uint32_t i) const { push(contributions.load(i)); }
 
     AMBILUX_HD uint32_t push(const Contribution& c) const {
-        if (!is_valid_radiance(c.value, record)) return 0;
+        if (add(c) && strategies.sums)
+            strategies.arrive(c.path, wave.width * wave.height, wave.locate(c.path).pixel, c.value);
+        return 0;
+    }
+    /// To the sample alone.
+    AMBILUX_HD bool add(const Contribution& c) const {
+        if (!is_valid_radiance(c.value, record)) return false;
         if (needs_atomic_add)
             add_rgb(reinterpret_cast<float*>(samples + c.path), c.value);
         else
             set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
-        if (strategies.sums) strategies.arrive(c.path, wave.width * wave.height, wave.locate(c.path).pixel, c.value);
-        return 0;
+        return true;
     }
 };
 

@@ -75,6 +75,7 @@ public:
         : first_sample_(first_sample), subpaths_(subpaths), samples_(policy.vcm.samples) {
         policy.waves.iterations_together = 1;
         wave_.iteration = first_sample / policy.vcm.samples;
+        wave_.samples = policy.vcm.samples;
         uint64_t count = 0;
         for (const auto& part : kept) count += part.size();
         const StateSize size = {uint32_t(count), host_primitive_bytes()};
@@ -93,7 +94,7 @@ public:
         CpuWholeExecutor exec;
         StageRecord record{};
         exec.sort_pairs(state_.order, size.appended, state_.key_bits(), &record);
-        exec.for_each(FindCells{state_, &record}, size.appended + 1);
+        exec.for_each(FindCells{state_, &wave_, samples_, &record}, size.appended + 1);
         exec.for_each(PlaceVertices{state_, &record}, size.appended);
     }
     ReplayIteration(const ReplayIteration&) = delete;

@@ -53,7 +53,7 @@ TEST_CASE("A merge with a radius of nothing weighs nothing, and leaves the other
     const MergeNow now = {0.0f, 0.0f};
     const BidirectionalMis two = settings(0);
     const MergingMis mis{two, &now, true};
-    const MergingSums y{2.0f, 3.0f, 5.0f}, z{7.0f, 0.5f, 4.0f};
+    const MergingSums y{2.0f, 3.0f, 5.0f, 1.0f}, z{7.0f, 0.5f, 4.0f, 1.0f};
     const ConnectionDensities p{0.3f, 0.2f, 0.7f, 1.1f};
     CHECK(mis.connection_ratio(y, false, z, false, p) ==
           two.connection_ratio({y.dvcm, y.dvc}, false, {z.dvcm, z.dvc}, false, p));

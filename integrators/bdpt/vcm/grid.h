@@ -24,7 +24,7 @@ struct MergeVertex {
     Vec2f d;  ///< of the light, octahedral map
     float dvc, dvm;
 
-    AMBILUX_HD MergingSums sums() const { return {dvcm, dvc, dvm}; }
+    AMBILUX_HD MergingSums sums() const { return {dvcm, dvc, dvm, 1.0f}; }
 };
 
 /// A cell of the grid.

@@ -102,7 +102,7 @@ struct VcmIntegrator {
             }
             append = {m.kept, state, record(append)};
             sort = parts.layout.record("sort_vertices");
-            find = {state, record(find)};
+            find = {state, parts.wave.state, p.vcm.samples, record(find)};
             place = {state, record(place)};
         }
     };

@@ -70,9 +70,7 @@ struct Merge {
                 if (samples.strategies.sums) remember(sum, m, y.front.depth + 1, path.depth + 1, hit.ray.path);
             }
             const Rgb light = sum.light(sum.sum);
-            Accumulate gathered = samples;
-            gathered.strategies = {};
-            if (!is_zero(light)) gathered.push(Contribution{light, hit.ray.path});
+            if (!is_zero(light)) samples.add(Contribution{light, hit.ray.path});
         });
     }
 

@@ -26,7 +26,7 @@ struct MergingSums {
     static constexpr uint32_t kFirstRayWords = 3;
 
     float dvcm, dvc, dvm;
-    float area = 1.0f;  ///< of an eye subpath: of the disk within which it merges, over that of MergeNow::radius
+    float area;  ///< of an eye subpath: of the disk within which it merges, over that of MergeNow::radius
 };
 
 /// Radius of a disk across a camera ray that has the area of a pixel's footprint at `distance`.
@@ -73,7 +73,7 @@ struct MergingMis : BidirectionalMis {
     AMBILUX_HD void start_eye(const SceneView& scene, Vec3f d, Sums& sums, SubpathStart& start) const {
         MisSums two;
         BidirectionalMis::start_eye<F>(scene, d, two, start);
-        sums = {two.dvcm, two.dvc, 0.0f};
+        sums = {two.dvcm, two.dvc, 0.0f, 1.0f};
     }
     template <Features F, class Path, class Lights>
     AMBILUX_HD Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
@@ -81,7 +81,7 @@ struct MergingMis : BidirectionalMis {
         const MisSums s = BidirectionalMis::sums_at<F>(scene, lights, side, path, {sums.dvcm, sums.dvc}, point);
         if (path.depth == 1) {
             const float merge = competes() && (side == Side::light || merges_first) ? 1.0f : 0.0f;
-            if (side == Side::light) return beside() ? Sums{s.dvcm, s.dvc, merge} : Sums{0.0f, 0.0f, merge};
+            if (side == Side::light) return beside() ? Sums{s.dvcm, s.dvc, merge, 1.0f} : Sums{0.0f, 0.0f, merge, 1.0f};
             const float distance = length(point.p - path.origin) + path.start.camera_distance;
             return {s.dvcm, s.dvc, merge,
                     area<F>(scene.sensor, camera_cosine<F>(scene.sensor, path.direction), distance)};

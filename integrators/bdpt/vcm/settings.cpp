@@ -75,7 +75,7 @@ float VcmSettings::first_radius(float scene, float pixel) const {
 
 std::string MergingVariant::bias(const RenderSettings& settings) {
     const VcmSettings s = VcmSettings::plan(settings);
-    const char* const units[] = {" of the scene's", " units of the scene", " pixels", " pixels, each where it looks"};
+    const char* const units[] = {" of the scene's", " units of the scene", " pixels", " footprints of the pixel"};
     const std::string radius = s.open_radius() ? fmt::format("a radius of at most {:.3g} of the scene's",
                                                              kUsualRadius / std::sqrt(float(s.samples)))
                                                : fmt::format("a radius of {:.3g}{}", s.radius, units[uint32_t(s.unit)]);

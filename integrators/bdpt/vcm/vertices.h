@@ -107,13 +107,16 @@ struct FindCells {
     static constexpr const char* kName = "find_cells";
 
     VcmState state;
+    const WaveState* wave;
+    uint32_t samples;  ///< of an iteration
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const uint64_t* keys = state.order.keys[1];
         const uint32_t count = state.all.merges.counter->size();
         const uint32_t first = i > 0 ? state.keys.place(keys[i - 1]) + 1 : 0;
-        const uint32_t last = i < count ? state.keys.place(keys[i]) : state.places;
+        const uint32_t end = state.keys.place(wave->samples / samples, 0);
+        const uint32_t last = i < count ? state.keys.place(keys[i]) : end;
         for (uint32_t place = first; place <= last; ++place) state.starts[place] = i;
     }
 };
