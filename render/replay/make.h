@@ -11,14 +11,16 @@ namespace ambilux {
 std::string listed(std::vector<std::string> names);
 
 struct BidirectionalMis;
-struct VcmPolicy;
+struct MergingMis;
 template <class Mis>
 struct BdptPolicyOf;
+template <class Mis>
+struct VcmPolicyOf;
 
 std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
                                          const BdptPolicyOf<BidirectionalMis>& policy, ReplayPairing pairing);
 std::unique_ptr<Replay> make_merging_replay(const Scene& scene, const RenderSettings& settings,
-                                            const HostTracer& tracer, const VcmPolicy& policy);
+                                            const HostTracer& tracer, const VcmPolicyOf<MergingMis>& policy);
 
 using MakeReplay = std::unique_ptr<Replay> (*)(const Scene&, const RenderSettings&, const HostTracer&);
 /// Null: there is no replay of it.

@@ -16,16 +16,37 @@ struct MergePlace {
     uint32_t depth;  ///< segments of the light subpath up to here
 };
 
+/// Words of the sums that merges ask light vertices for: those that vertices keep, or Sums::kLightWords.
+template <class Sums>
+constexpr uint32_t light_words() {
+    if constexpr (requires { Sums::kLightWords; })
+        return Sums::kLightWords;
+    else
+        return vertex_words<Sums>();
+}
+
 /// A light vertex as a merge sees it.
-struct MergeVertex {
+template <class Mis>
+struct MergeVertexOf {
+    using Sums = PackedSums<3, light_words<typename Mis::Sums>()>;
+
     MergePlace front;
     Rgb flux;  ///< over the number of light subpaths it is what arrives
-    float dvcm;
+    float sum0;
     Vec2f d;  ///< of the light, octahedral map
-    float dvc, dvm;
+    float sum1, sum2;
+    typename Sums::More more;
 
-    AMBILUX_HD MergingSums sums() const { return {dvcm, dvc, dvm, 1.0f}; }
+    AMBILUX_HD static MergeVertexOf make(MergePlace front, Rgb flux, Vec2f d, const typename Mis::Sums& sums) {
+        const Sums s = Sums::pack(sums);
+        return {front, flux, s.word[0], d, s.word[1], s.word[2], s.more};
+    }
+    AMBILUX_HD typename Mis::Sums sums() const {
+        return Sums{{sum0, sum1, sum2}, more}.template unpack<typename Mis::Sums>();
+    }
 };
+using MergeVertex = MergeVertexOf<MergingMis>;
+static_assert(sizeof(MergeVertex) == 3 * 16);
 
 /// A cell of the grid.
 struct MergeCell {
@@ -62,29 +83,32 @@ struct MergeGrid {
 };
 
 /// Light vertices: as merges see them and, where subpaths are connected, as connections do.
-struct VcmVertices {
-    Queue<MergeVertex> merges;
-    LaneArray<ConnectionVertex<MergingMis>> connections;  ///< at the places of `merges`
-    uint64_t* keys;                                       ///< likewise
+template <class Mis>
+struct VcmVerticesOf {
+    Queue<MergeVertexOf<Mis>> merges;
+    LaneArray<ConnectionVertex<Mis>> connections;  ///< at the places of `merges`
+    uint64_t* keys;                                ///< likewise
 
     /// `growing`: the name of the queue.
     template <class Policy>
-    static VcmVertices lay_out(Layout& layout, const char* growing, const Policy& p, uint32_t n) {
-        VcmVertices v;
-        v.merges = layout.growing_queue<MergeVertex>(growing, p.keeps_vertices ? n : 0);
-        v.connections = layout.array<ConnectionVertex<MergingMis>>(p.rules.connect ? n : 0, p.vertex_lanes);
+    static VcmVerticesOf lay_out(Layout& layout, const char* growing, const Policy& p, uint32_t n) {
+        VcmVerticesOf v;
+        v.merges = layout.growing_queue<MergeVertexOf<Mis>>(growing, p.keeps_vertices ? n : 0);
+        v.connections = layout.array<ConnectionVertex<Mis>>(p.rules.connect ? n : 0, p.vertex_lanes);
         return v;
     }
 };
+using VcmVertices = VcmVerticesOf<MergingMis>;
 
 /// What lives as long as iterations that are done at once: the light vertices of all their waves. Nothing outlives
 /// them, and the radius follows from their number.
-struct VcmState {
+template <class Mis>
+struct VcmStateOf {
     static constexpr StateKind kKind = StateKind::by_index;
 
-    VcmVertices all;                ///< as they were appended; keys are those of `order`
-    LaneArray<MergeVertex> sorted;  ///< in the order of keys
-    LaneArray<ConnectionVertex<MergingMis>> sorted_connections;
+    VcmVerticesOf<Mis> all;                ///< as they were appended; keys are those of `order`
+    LaneArray<MergeVertexOf<Mis>> sorted;  ///< in the order of keys
+    LaneArray<ConnectionVertex<Mis>> sorted_connections;
     SortMemory<uint64_t> order;  ///< keys and places
     uint32_t* starts;            ///< in the order of keys: of each place in the tables of all iterations, and the end
     uint32_t places;             ///< in these tables
@@ -92,12 +116,12 @@ struct VcmState {
     uint32_t lanes;  ///< of a vertex for connections
 
     template <class Policy>
-    static VcmState lay_out(Layout& layout, const Policy& p, const StateSize& size) {
+    static VcmStateOf lay_out(Layout& layout, const Policy& p, const StateSize& size) {
         const uint32_t n = p.keeps_vertices ? size.appended : 0;
-        VcmState s;
-        s.all = VcmVertices::lay_out(layout, "merge_vertices", p, n);
-        s.sorted = layout.array<MergeVertex>(n);
-        s.sorted_connections = layout.array<ConnectionVertex<MergingMis>>(p.rules.connect ? n : 0, p.vertex_lanes);
+        VcmStateOf s;
+        s.all = VcmVerticesOf<Mis>::lay_out(layout, "merge_vertices", p, n);
+        s.sorted = layout.array<MergeVertexOf<Mis>>(n);
+        s.sorted_connections = layout.array<ConnectionVertex<Mis>>(p.rules.connect ? n : 0, p.vertex_lanes);
         s.order = SortMemory<uint64_t>::lay_out(layout, n, size.primitives);
         s.all.keys = s.order.keys[0];
         s.places = p.waves.iterations_together << p.keys.table_bits;
@@ -108,8 +132,8 @@ struct VcmState {
     }
     uint32_t key_bits() const { return keys.shift() + uint32_t(std::bit_width(places - 1)); }
     /// The vertices in order, for connections that draw from them.
-    AMBILUX_HD Queue<ConnectionVertex<MergingMis>> drawn() const {
-        Queue<ConnectionVertex<MergingMis>> q;
+    AMBILUX_HD Queue<ConnectionVertex<Mis>> drawn() const {
+        Queue<ConnectionVertex<Mis>> q;
         q.items = sorted_connections;
         q.counter = all.merges.counter;
         return q;
@@ -121,17 +145,19 @@ struct VcmState {
     void for_each_saved(Visit) const {}
     /// Of `old`, which had too little room.
     template <class Copy>
-    void take_items(const VcmState& old, uint32_t items, Copy copy) const {
-        take_lanes(all.merges.items, old.all.merges.items, LaneArray<MergeVertex>::kLanes, items, copy);
+    void take_items(const VcmStateOf& old, uint32_t items, Copy copy) const {
+        take_lanes(all.merges.items, old.all.merges.items, LaneArray<MergeVertexOf<Mis>>::kLanes, items, copy);
         if (all.connections.capacity > 0) take_lanes(all.connections, old.all.connections, lanes, items, copy);
         copy(order.keys[0], old.order.keys[0], items);
         copy(order.values[0], old.order.values[0], items);
     }
 };
+using VcmState = VcmStateOf<MergingMis>;
 
 /// Light vertices within a radius, one after the other.
+template <class Mis>
 struct NearVertices {
-    const VcmState& state;
+    const VcmStateOf<Mis>& state;
     MergeGrid grid;
     uint32_t iteration;  ///< of those that are done at once
     Vec3f p;
@@ -140,7 +166,7 @@ struct NearVertices {
     uint32_t cells = 0;  ///< that were begun, of eight
     uint32_t place = 0, end = 0;
 
-    AMBILUX_HD NearVertices(const VcmState& s, const MergeGrid& g, uint32_t i, Vec3f center, float r)
+    AMBILUX_HD NearVertices(const VcmStateOf<Mis>& s, const MergeGrid& g, uint32_t i, Vec3f center, float r)
         : state(s), grid(g), iteration(i), p(center), radius(r), first(g.first_cell(center)) {}
 
     /// The next, or kNone after the last. One loop over cells and their vertices: threads of a warp that begin a cell

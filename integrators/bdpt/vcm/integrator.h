@@ -11,11 +11,11 @@
 
 namespace ambilux {
 
-template <Features F, class Tracer, Fusion kFusion>
-struct VcmIntegrator {
-    using Mis = MergingMis;
-    using Policy = VcmPolicy;
-    using State = VcmState;
+template <Features F, class Tracer, Fusion kFusion, class MisModel>
+struct VcmOf {
+    using Mis = MisModel;
+    using Policy = VcmPolicyOf<Mis>;
+    using State = VcmStateOf<Mis>;
     static constexpr bool kFilmWide = true;
     static constexpr uint32_t kPhases = 2;
 
@@ -45,14 +45,14 @@ struct VcmIntegrator {
 
     struct Memory {
         TwoSidesMemory<Mis> two_sides;
-        VcmVertices kept;
+        VcmVerticesOf<Mis> kept;
         MergeNow* now;
         SortMemory<uint32_t> queries;
     };
     static Memory lay_out(Layout& layout, const Policy& p, const WaveSize& n) {
         Memory m;
         m.two_sides = TwoSidesMemory<Mis>::template lay_out<kFusion, F>(layout, p, n);
-        m.kept = VcmVertices::lay_out(layout, "wave_merge_vertices", p, n.kept);
+        m.kept = VcmVerticesOf<Mis>::lay_out(layout, "wave_merge_vertices", p, n.kept);
         m.kept.keys = layout.allocate<uint64_t>(m.kept.merges.capacity());
         m.now = layout.allocate<MergeNow>(1);
         m.queries =
@@ -61,16 +61,16 @@ struct VcmIntegrator {
     }
 
     struct Stages {
-        TwoSidesStages<F, Tracer, kFusion, VcmSource> two_sides;
+        TwoSidesStages<F, Tracer, kFusion, VcmSourceOf<Mis>> two_sides;
         bool keeps;
         SetRadius set_radius;
-        KeepVertices<F> keep[2];
-        AppendVertices append;
+        KeepVertices<F, Mis> keep[2];
+        AppendVertices<Mis> append;
         StageRecord* sort;
-        FindCells find;
-        PlaceVertices place;
-        OrderQueries<F> order[2];
-        Merge<F> merge[2];
+        FindCells<Mis> find;
+        PlaceVertices<Mis> place;
+        OrderQueries<F, Mis> order[2];
+        Merge<F, Mis> merge[2];
 
         Stages(const WaveParts<Tracer>& parts, const Policy& plan, const Memory& m, const State& state)
             : Stages(parts, m, state, with(plan, m.now)) {}
@@ -82,7 +82,8 @@ struct VcmIntegrator {
             return p;
         }
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& state, const Policy& p)
-            : two_sides(parts, p, m.two_sides, VcmSource::of(state, parts.wave.state, p)), keeps(p.keeps_vertices) {
+            : two_sides(parts, p, m.two_sides, VcmSourceOf<Mis>::of(state, parts.wave.state, p)),
+              keeps(p.keeps_vertices) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
             const auto& hits = m.two_sides.subpaths.hits;
@@ -131,7 +132,7 @@ private:
         exec.for_each(s.set_radius, 1);
         run_light_subpaths(exec, all.light, all.splats, all.policy, [&](int k, const auto& vertex) {
             if (!s.keeps) return;
-            KeepVertices<F> keep = s.keep[k];
+            KeepVertices<F, Mis> keep = s.keep[k];
             keep.wave.first_key = vertex.wave.first_key;
             exec.for_each(keep, keep.hits);
         });
@@ -152,16 +153,19 @@ private:
         });
     }
     template <class Executor>
-    static void merge(Executor& exec, const OrderQueries<F>& order, const Merge<F>& merge) {
+    static void merge(Executor& exec, const OrderQueries<F, Mis>& order, const Merge<F, Mis>& merge) {
         if constexpr (Executor::kHost) {
             exec.for_each(merge, merge.hits);
         } else {
             exec.for_each(order, merge.hits);
             exec.sort_pairs(order.order.sort, merge.hits, order.bits, merge.record, QueryOrder::kLeast);
-            exec.for_each(MergeInOrder<F>{merge, order.order, merge.record}, merge.hits);
+            exec.for_each(MergeInOrder<F, Mis>{merge, order.order, merge.record}, merge.hits);
         }
     }
 };
+
+template <Features F, class Tracer, Fusion K>
+using VcmIntegrator = VcmOf<F, Tracer, K, MergingMis>;
 
 /// The same, with what their names switch off.
 template <Features F, class Tracer, Fusion K>

@@ -16,17 +16,17 @@ struct MergeFound {
 };
 
 /// What all merges of an eye vertex bring.
-template <Features F>
+template <Features F, class Mis = MergingMis>
 struct MergeSum {
     const SceneView& scene;
-    const Rules<MergingMis>& rules;
-    const Vertex<MergingMis>& z;
-    const Subpath<MergingMis>& path;  ///< that ends at z
+    const Rules<Mis>& rules;
+    const Vertex<Mis>& z;
+    const Subpath<Mis>& path;  ///< that ends at z
     Rgb sum = {0.0f, 0.0f, 0.0f};
 
     AMBILUX_HD void add(const MergeFound& m) { sum += m.times(mis_weight(m.ratio)); }
     /// False if `y` brings nothing. Flux over an area is radiance times the cosine to that area.
-    AMBILUX_HD bool find(const MergeVertex& y, MergeFound& m) const {
+    AMBILUX_HD bool find(const MergeVertexOf<Mis>& y, MergeFound& m) const {
         const Vec3f d = octahedral_decode(y.d);
         m.cosine = fabsf(dot(z.point.ng, d));
         if (path.depth + y.front.depth > rules.max_depth || !(m.cosine > 0.0f)) return false;
@@ -40,10 +40,9 @@ struct MergeSum {
     AMBILUX_HD Rgb light(Rgb found) const { return path.throughput * found * (1.0f / rules.mis.eta(z.sums)); }
 };
 
-template <Features F>
+template <Features F, class Mis>
 struct Merge {
     static constexpr const char* kName = "merge";
-    using Mis = MergingMis;
     using Items = SubpathItems<Mis>;
 
     SceneView scene;
@@ -51,7 +50,7 @@ struct Merge {
     Rules<Mis> rules;
     IterationNumbers numbers;
     Queue<HitItem<typename Items::Ray>> hits;
-    VcmState state;
+    VcmStateOf<Mis> state;
     Accumulate samples;
     StageRecord* record;
 
@@ -59,11 +58,11 @@ struct Merge {
         const auto hit = hits.load(i);
         at_mergeable<F>(scene, rules, Side::eye, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& z) {
             if (path.depth == 1 && !rules.mis.merges_first) return;
-            MergeSum<F> sum = {scene, rules, z, path};
-            NearVertices near = {state, MergeGrid::of(scene, rules.mis.now->radius),
-                                 numbers.iteration(wave, hit.ray.path), z.point.p, rules.mis.radius(z.sums)};
+            MergeSum<F, Mis> sum = {scene, rules, z, path};
+            NearVertices<Mis> near = {state, MergeGrid::of(scene, rules.mis.now->radius),
+                                      numbers.iteration(wave, hit.ray.path), z.point.p, rules.mis.radius(z.sums)};
             for (uint32_t k; (k = near.next()) != kNone;) {
-                const MergeVertex y = state.sorted.load(k);
+                const MergeVertexOf<Mis> y = state.sorted.load(k);
                 MergeFound m;
                 if (!sum.find(y, m)) continue;
                 sum.add(m);
@@ -76,18 +75,19 @@ struct Merge {
 
 private:
     /// For the image of this strategy.
-    AMBILUX_HD void remember(const MergeSum<F>& sum, const MergeFound& m, uint32_t s, uint32_t t, uint32_t slot) const {
+    AMBILUX_HD void remember(const MergeSum<F, Mis>& sum, const MergeFound& m, uint32_t s, uint32_t t,
+                             uint32_t slot) const {
         samples.strategies.add_merge(s, t, wave.width * wave.height, wave.locate(slot).pixel, sum.light(m.times(1.0f)),
                                      sum.light(m.times(mis_weight(m.ratio))));
     }
 };
 
 /// Merge over vertices in order.
-template <Features F>
+template <Features F, class Mis>
 struct MergeInOrder {
-    static constexpr const char* kName = Merge<F>::kName;
+    static constexpr const char* kName = Merge<F, Mis>::kName;
 
-    Merge<F> merge;
+    Merge<F, Mis> merge;
     QueryOrder order;
     StageRecord* record;
 

@@ -24,6 +24,7 @@ struct MergeNow {
 /// the word says whether a merge at that vertex itself counts, 1 or 0.
 struct MergingSums {
     static constexpr uint32_t kFirstRayWords = 3;
+    static constexpr uint32_t kLightWords = 3;
 
     float dvcm, dvc, dvm;
     float area;  ///< of an eye subpath: of the disk within which it merges, over that of MergeNow::radius

@@ -12,8 +12,9 @@
 
 namespace ambilux {
 
-VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
-    VcmPolicy p{plan_bdpt<MergingMis>(scene, settings), VcmSettings::plan(settings)};
+template <class Mis>
+VcmPolicyOf<Mis> VcmPolicyOf<Mis>::plan(const Scene& scene, const RenderSettings& settings) {
+    VcmPolicyOf p{plan_bdpt<Mis>(scene, settings), VcmSettings::plan(settings), {}, 0.0f, 0};
     p.rules.mis.merges = variant_of(settings).traits.merges;
     p.rules.mis.merges_first = p.vcm.first;
     p.rules.directions.deltas_only = !p.rules.mis.competes();
@@ -35,12 +36,15 @@ VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
     return p;
 }
 
-void VcmPolicy::size_table(double mean_vertices) {
+template <class Mis>
+void VcmPolicyOf<Mis>::size_table(double mean_vertices) {
     const uint64_t vertices = uint64_t(std::max(mean_vertices * double(subpaths()), 1.0));
     keys.table_bits =
         std::clamp(uint32_t(std::bit_width(vertices)), MergeKeys::kLeastTableBits, MergeKeys::kMostTableBits);
     waves.iterations_together =
         1u << std::min(MergeKeys::kMostTableBits - keys.table_bits, MergeKeys::kMostIterationBits);
 }
+
+template struct VcmPolicyOf<MergingMis>;
 
 }  // namespace ambilux

@@ -9,7 +9,11 @@
 
 namespace ambilux {
 
-struct VcmPolicy : BdptPolicyOf<MergingMis> {
+template <class Mis>
+struct VcmPolicyOf : BdptPolicyOf<Mis> {
+    using BdptPolicyOf<Mis>::rules;
+    using BdptPolicyOf<Mis>::waves;
+
     VcmSettings vcm;
     MergeKeys keys;
     float first_radius;     ///< of the first iteration
@@ -26,9 +30,10 @@ struct VcmPolicy : BdptPolicyOf<MergingMis> {
     }
 
     /// Throws Error(usage) if light subpaths of an iteration are more than keys can number.
-    static VcmPolicy plan(const Scene& scene, const RenderSettings& settings);
+    static VcmPolicyOf plan(const Scene& scene, const RenderSettings& settings);
     /// Chooses the table by the mean number of vertices that a light subpath leaves, and how many there may be.
     void size_table(double mean_vertices);
 };
+using VcmPolicy = VcmPolicyOf<MergingMis>;
 
 }  // namespace ambilux

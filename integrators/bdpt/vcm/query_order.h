@@ -29,14 +29,14 @@ struct QueryOrder {
     }
 };
 
-template <Features F>
+template <Features F, class Mis>
 struct OrderQueries {
     static constexpr const char* kName = "order_queries";
 
     SceneView scene;
     Wave wave;
     IterationNumbers numbers;
-    Queue<HitItem<SubpathItems<MergingMis>::Ray>> hits;
+    Queue<HitItem<typename SubpathItems<Mis>::Ray>> hits;
     QueryOrder order;
     uint32_t bits;  ///< of keys
     StageRecord* record;

@@ -27,28 +27,27 @@ struct SetRadius {
 };
 
 /// Calls `use` with the vertex where a subpath hit, if a merge there would be part of a path that counts.
-template <Features F, class Use>
-AMBILUX_HD void at_mergeable(const SceneView& scene, const Rules<MergingMis>& rules, Side side,
-                             const HitItem<SubpathItems<MergingMis>::Ray>& h, Use use) {
+template <Features F, class Mis, class Use>
+AMBILUX_HD void at_mergeable(const SceneView& scene, const Rules<Mis>& rules, Side side,
+                             const HitItem<typename SubpathItems<Mis>::Ray>& h, Use use) {
     if (h.prim == kNone) return;
-    const Subpath<MergingMis> path = SubpathItems<MergingMis>::unpack(h.ray);
+    const Subpath<Mis> path = SubpathItems<Mis>::unpack(h.ray);
     if (path.depth >= rules.max_depth) return;
-    const Vertex<MergingMis> vertex = vertex_at<F>(scene, rules, side, path, surface_at<F>(scene, h.prim, h.u, h.v));
+    const Vertex<Mis> vertex = vertex_at<F>(scene, rules, side, path, surface_at<F>(scene, h.prim, h.u, h.v));
     if (bsdf_is_smooth(vertex.scattering.bsdf)) use(path, vertex);
 }
 
 /// Vertices of light subpaths where merges and connections may end, one for each hit.
-template <Features F>
+template <Features F, class Mis = MergingMis>
 struct KeepVertices {
     static constexpr const char* kName = "keep_vertices";
-    using Mis = MergingMis;
     using Items = SubpathItems<Mis>;
 
     SceneView scene;
     Wave wave;
     Rules<Mis> rules;
     Queue<HitItem<typename Items::Ray>> hits;
-    VcmVertices kept;
+    VcmVerticesOf<Mis> kept;
     const MergeNow* now;
     IterationNumbers numbers;
     MergeKeys keys;
@@ -66,12 +65,8 @@ struct KeepVertices {
 
 private:
     AMBILUX_HD void keep(uint32_t slot, const Subpath<Mis>& path, const Vertex<Mis>& y) const {
-        const uint32_t place = kept.merges.push({{y.point.p, path.depth},
-                                                 path.throughput,
-                                                 y.sums.dvcm,
-                                                 octahedral_encode(path.direction),
-                                                 y.sums.dvc,
-                                                 y.sums.dvm});
+        const uint32_t place = kept.merges.push(MergeVertexOf<Mis>::make({y.point.p, path.depth}, path.throughput,
+                                                                         octahedral_encode(path.direction), y.sums));
         if (place >= kept.merges.capacity()) return;
         const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(keys.table_bits);
         kept.keys[place] =
@@ -83,14 +78,15 @@ private:
 };
 
 /// Those of a wave become vertices of all.
+template <class Mis = MergingMis>
 struct AppendVertices {
     static constexpr const char* kName = "append_vertices";
 
-    VcmVertices mine;
-    VcmState state;
+    VcmVerticesOf<Mis> mine;
+    VcmStateOf<Mis> state;
     StageRecord* record;
 
-    const Queue<MergeVertex>& items() const { return mine.merges; }
+    const Queue<MergeVertexOf<Mis>>& items() const { return mine.merges; }
     QueueCounter* target() const { return state.all.merges.counter; }
 
     AMBILUX_HD void operator()(uint32_t i, uint32_t place) const {
@@ -103,10 +99,11 @@ struct AppendVertices {
 };
 
 /// Where the vertices of each place in the tables start, once keys are sorted. Over one item more than there are.
+template <class Mis = MergingMis>
 struct FindCells {
     static constexpr const char* kName = "find_cells";
 
-    VcmState state;
+    VcmStateOf<Mis> state;
     const WaveState* wave;
     uint32_t samples;  ///< of an iteration
     StageRecord* record;
@@ -122,10 +119,11 @@ struct FindCells {
 };
 
 /// Vertices go to their places in the order of keys.
+template <class Mis = MergingMis>
 struct PlaceVertices {
     static constexpr const char* kName = "place_vertices";
 
-    VcmState state;
+    VcmStateOf<Mis> state;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
