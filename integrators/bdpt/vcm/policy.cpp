@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "core/error.h"
+#include "integrators/bdpt/correlated/correlation_mis.h"
 #include "integrators/bdpt/vcm/grid.h"
 #include "integrators/registry.h"
 #include "scene/scene.h"
@@ -46,5 +47,6 @@ void VcmPolicyOf<Mis>::size_table(double mean_vertices) {
 }
 
 template struct VcmPolicyOf<MergingMis>;
+template struct VcmPolicyOf<CorrelationMis>;
 
 }  // namespace ambilux
