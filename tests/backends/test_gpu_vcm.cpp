@@ -35,6 +35,19 @@ TEST_CASE("vcm: CPU and CUDA agree, and with deterministic=true bits depend on n
             }
 }
 
+TEST_CASE("vcm correlated: CPU and CUDA agree, and bits depend on no size of waves") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "glass", "lights"})
+        for (const char* heuristic : {"balance", "power"}) {
+            const Scene scene = project_scene(name, 64, 48);
+            RenderSettings s = merging(scene, "vcm");
+            s.variant = "correlated";
+            apply_setting(s, "heuristic", heuristic);
+            INFO(name << ", " << heuristic);
+            check_on_device(scene, s, 8);
+        }
+}
+
 TEST_CASE("What is vcm with strategies switched off: CPU and CUDA agree") {
     if (!device()) return;
     for (const char* integrator : {"bpm", "ppm", "sppm", "pm"})

@@ -53,6 +53,7 @@ struct OracleStrategies {
     std::vector<uint32_t> group;
     std::vector<double> density;
     std::vector<double> merges;  ///< [j]: of both subpaths ending at x_j; 0 where they cannot
+    bool scaled = false;         ///< those of merges by what merges have in common
 };
 
 /// Merging of light and eye vertices: how many light subpaths a disk around a vertex expects at density 1, whether
@@ -64,6 +65,8 @@ struct OracleMerges {
     double largest_footprint =
         0;  ///< radius; 0: disks are the same for all paths. Else smaller pixels have smaller ones
     double least_area = 1;
+    uint32_t scaled_up_to = 0;  ///< vertices of paths whose merges are scaled by what they have in common
+    double least_factor = 0;
 };
 
 namespace oracle {
@@ -266,6 +269,38 @@ inline double oracle_merge_area(const SceneView& scene, const OraclePath& path, 
                       merges.least_area, 1.0);
 }
 
+/// Factors of merges at x_j by the chance that another subpath of either side comes by nearby.
+inline std::vector<double> oracle_merge_factors(const SceneView& scene, const OraclePath& path,
+                                                const OracleSteps& steps, double least) {
+    using namespace oracle;
+    const uint32_t k = path.k;
+    const EmitterType type = scene.emitters[path.emitter].type;
+    const Sensor& sensor = scene.sensor;
+    const Vec3f seen = path.vertices[k - 1].point.p;
+    double distance = std::sqrt(distance2(seen, path.camera_p));
+    if (camera_delta_direction(sensor)) {  // from where rays begin
+        const Vec3f axis = sensor.to_world.vector({0, 0, 1});
+        const double scale = std::sqrt(dot64(axis, axis));
+        distance = dot64(seen - sensor.to_world.point({0, 0, 0}), axis) / scale - double(sensor.near_clip) * scale;
+    }
+    const double nearby = M_PI * std::pow(std::tan(M_PI / 180) * distance, 2);
+    const auto chance = [&](const OracleDensity& q) { return std::min(1.0, q.value * nearby); };
+    std::vector<double> light(k, 1.0), eye(k, 1.0), factor(k, 1.0);
+    if (type == EmitterType::area) light[0] = chance(steps.light[0]);
+    for (uint32_t j = 1; j < k; ++j) {
+        const bool follows = j == 1 ? is_beam(type) : path.vertices[j - 1].delta;
+        light[j] = light[j - 1] * (follows ? 1 : chance(steps.light[j]));
+    }
+    for (uint32_t j = k - 1; j > 0; --j)
+        eye[j] =
+            j == k - 1 ? chance(steps.eye[j]) : eye[j + 1] * (path.vertices[j + 1].delta ? 1 : chance(steps.eye[j]));
+    for (uint32_t j = 1; j + 1 < k; ++j) {
+        const double l = std::max(light[j], 1e-30), e = std::max(eye[j], 1e-30);
+        factor[j] = std::max(e / (e + l - e * l), least);
+    }
+    return factor;
+}
+
 /// Densities of all strategies for a path. `light_subpaths`: light subpaths per eye subpath of a pixel; `connections`:
 /// light subpaths that an eye vertex is connected with.
 inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePath& path, const OracleSteps& steps,
@@ -305,6 +340,11 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
         for (uint32_t i = 0; i < k; ++i) p *= (i <= j ? steps.light[i].value : 1) * (i >= j ? steps.eye[i].value : 1);
         r.merges[j] = p;
         if (merges.alone) r.group[0] = 0, r.density[0] = 0;
+    }
+    r.scaled = k >= 2 && k - 1 <= merges.scaled_up_to;
+    if (r.scaled) {
+        const std::vector<double> factor = oracle_merge_factors(scene, path, steps, merges.least_factor);
+        for (uint32_t j = 1; j < k; ++j) r.merges[j] *= factor[j];
     }
     // The environment that the camera sees belongs to both masks that could show it.
     if (k == 1 && is_infinite(type) && !is_delta(type)) r.group[0] = kHitStrategies | kLightStrategies;
@@ -361,6 +401,7 @@ inline double oracle_weight_error(const OracleStrategies& all, const OracleSteps
         for (uint32_t i = 0; i < k; ++i) {
             if ((i <= j) != (i < s)) e += steps.light[i].error;
             if ((i >= j) != (i >= s)) e += steps.eye[i].error;
+            if (all.scaled) e += steps.light[i].error + steps.eye[i].error;
         }
         sum += term;
         error += term * e * (heuristic == MisHeuristic::power ? 2 : 1);

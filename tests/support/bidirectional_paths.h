@@ -627,7 +627,10 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     CameraSample c{};
     c.d = -path.to_eye[k - 1];
     c.o = path.camera_p;
-    if (!is_latlong(scene_.sensor.type)) c.o = c.o + c.d * (scene_.sensor.near_clip * axis_length / cos_camera);
+    if (camera_delta_direction(scene_.sensor))
+        c.o = position(k - 1) - c.d * camera.distance;
+    else if (!is_latlong(scene_.sensor.type))
+        c.o = c.o + c.d * (scene_.sensor.near_clip * axis_length / cos_camera);
     w = start_eye<F>(scene_, mis_, c);
     for (uint32_t i = k - 1; i > 0; --i) {
         z[i] = meet(Side::eye, w, path.vertices[i]);
