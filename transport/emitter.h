@@ -57,7 +57,8 @@ template <Features F, class Lights>
 AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, const Lights& lights, const Receiver& receiver, Vec4f u,
                                         EmitterSample& s, typename Lights::Pick& pick) {
     if (view.emitter_count == 0) return false;
-    pick = lights.pick(view, receiver, u.x);
+    pick = lights.pick(view, receiver, u);
+    if constexpr (requires { pick.u; }) u = pick.u;
     const Vec3f reference_p = receiver.p;
     const Emitter& emitter = view.emitters[pick.emitter];
     s.emitter = pick.emitter;

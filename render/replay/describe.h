@@ -117,19 +117,19 @@ void replay_subpath(const ReplayContext<Mis>& ctx, uint32_t longest, const Subpa
 template <class Mis>
 std::vector<ReplayNumber> hit_densities(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, const Hit& hit) {
     constexpr Features F = kReplayFeatures;
-    const auto over_power = [&](uint32_t emitter) {
-        return ctx.rules.lights.over_power(ctx.view, receiver_of_ray(path.origin, path.sums), emitter);
+    const auto over_power = [&](uint32_t emitter, uint32_t prim) {
+        return ctx.rules.lights.over_power(ctx.view, receiver_of_ray(path.origin, path.sums), emitter, prim);
     };
     if (hit.prim == kNone)
         return {{"pdf_next_event_sa",
-                 pdf_environment_direct<F>(ctx.view, path.direction) * over_power(ctx.view.environment)}};
+                 pdf_environment_direct<F>(ctx.view, path.direction) * over_power(ctx.view.environment, kNone)}};
     const SurfacePoint light = surface_at<F>(ctx.view, hit.prim, hit.u, hit.v);
     const uint32_t emitter = ctx.view.shapes[light.shape].emitter;
     const Emitter& e = ctx.view.emitters[emitter];
     const float pick = e.pick_probability;
     return {{"opacity", area_opacity<F>(ctx.view, e, light.uv)},
-            {"pdf_next_event_sa",
-             pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light) * over_power(emitter)},
+            {"pdf_next_event_sa", pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light) *
+                                      over_power(emitter, light.prim)},
             {"pdf_emission_area", pick * pdf_emission_position<F>(ctx.view, emitter, light.prim)},
             {"pdf_emission_sa", pdf_emission_direction<F>(ctx.view, emitter, light.ng, -path.direction)}};
 }

@@ -1,8 +1,9 @@
 // How an emitter is picked for next event estimation. A sampler of lights is a type with
 //   Pick                            the emitter of a pick, and `over_power`: its probability as a multiple of
 //                                   Emitter::pick_probability, by which light subpaths begin
-//   pick(view, receiver, u)         picks one with u in [0,1)
-//   over_power(view, receiver, i)   of emitter i, whoever found it
+//                                   and, if the sampler spends more than u.x, the numbers `u` that are left
+//   pick(view, receiver, u)         picks one with u.x in [0,1); y, z and w are for the sample on it
+//   over_power(view, receiver, i, prim)   of emitter i, whoever found it; of an area emitter on primitive `prim`
 // Receivers and sums by value: a reference to a part of a subpath cost nvcc 380 bytes of spills (core/hd.h).
 // A model of weights names it (Mis::Lights), and Rules hold it.
 #pragma once
@@ -35,10 +36,10 @@ struct LightsByPower {
         static constexpr float over_power = 1.0f;
         uint32_t emitter;
     };
-    AMBILUX_HD static Pick pick(const SceneView& view, Receiver, float u) {
-        return {sample_cdf(view.emitter_cdf, view.emitter_count, u)};
+    AMBILUX_HD static Pick pick(const SceneView& view, Receiver, Vec4f u) {
+        return {sample_cdf(view.emitter_cdf, view.emitter_count, u.x)};
     }
-    AMBILUX_HD static constexpr float over_power(const SceneView&, Receiver, uint32_t) { return 1.0f; }
+    AMBILUX_HD static constexpr float over_power(const SceneView&, Receiver, uint32_t, uint32_t) { return 1.0f; }
 };
 
 }  // namespace ambilux

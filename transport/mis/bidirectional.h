@@ -110,7 +110,8 @@ struct BidirectionalMis {
         const float cos_in = fabsf(dot(point.ng, path.direction));
         const bool first = path.depth == 1;
         if (side == Side::light && first) {
-            const float over_power = lights.over_power(scene, Receiver{point.p, point.ng}, path.start.emitter);
+            const float over_power =
+                lights.over_power(scene, Receiver{point.p, point.ng}, path.start.emitter, path.start.prim);
             return first_light_sums<F>(scene, path, point.p, cos_in, over_power);
         }
         float d2 = length_squared(point.p - path.origin);
@@ -198,7 +199,7 @@ struct BidirectionalMis {
         }
         const float next_event =
             masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)) * inv_opacity *
-            lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter);
+            lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter, light.prim);
         const float emission = pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light;
         ratio = term(next_event * ray.dvcm) + term(emission * ray.dvc);
         return true;
@@ -215,7 +216,7 @@ struct BidirectionalMis {
         // Light subpaths draw their directions as next event estimation does.
         const float pdf_sa = pdf_environment_direct<F>(scene, path.direction);
         const float next_event =
-            pdf_sa * lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment);
+            pdf_sa * lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment, kNone);
         const float emission = pdf_sa * pdf_emission_position<F>(scene, scene.environment, kNone);
         ratio = term(masked(kNextEventStrategies, next_event) * ray.dvcm) + term(emission * ray.dvc);
         return true;

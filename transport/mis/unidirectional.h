@@ -53,7 +53,7 @@ struct UnidirectionalMis {
         float pdf_other_sa = 0.0f;
         if (next_event && !path.delta) {
             pdf_other_sa = pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) *
-                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter);
+                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter, light.prim);
             if constexpr (F.opacity) pdf_other_sa /= hit_opacity<F>(scene, emitter, light);
         }
         return ratio_to(ray, pdf_other_sa, ratio);
@@ -64,7 +64,7 @@ struct UnidirectionalMis {
         float pdf_other_sa = 0.0f;
         if (next_event && !path.delta)
             pdf_other_sa = pdf_environment_direct<F>(scene, path.direction) *
-                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment);
+                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment, kNone);
         return ratio_to(ray, pdf_other_sa, ratio);
     }
     template <Features F>

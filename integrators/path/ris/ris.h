@@ -80,7 +80,7 @@ private:
         const LightCandidate& y = reservoir.kept;
         const float scale = reservoir.sum / (float(settings.candidates) * reservoir.target);
         c.value = path.throughput * y.f.value * (y.light.radiance * scale);
-        const float over_power = rules.lights.over_power(scene, receiver, y.light.emitter);
+        const float over_power = rules.lights.over_power(scene, receiver, y.light.emitter, y.light.prim);
         c.environment = false;  // its radiance is in the value
         if (is_zero(c.value)) return false;
         return complete_next_event<F>(scene, rules, v, path.depth, over_power, y.light, y.f, c);
