@@ -24,6 +24,8 @@ struct Features {
     bool instances = false;     ///< any group of triangles in several places (scene/view.h, Instance)
     bool latlong = false;       ///< a sensor of all directions (models/sensor_list.h)
     bool phong_facets = false;  ///< any BSDF with Microfacets::phong
+    bool light_tree = false;    ///< next event estimation picks lights by a tree (scene/light_tree.h): not of a scene,
+                                ///< but of kernels
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -38,7 +40,8 @@ struct Features {
         return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
                (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
                (blends || !other.blends) && (coats || !other.coats) && (map_rules || !other.map_rules) &&
-               (instances || !other.instances) && (latlong || !other.latlong) && (phong_facets || !other.phong_facets);
+               (instances || !other.instances) && (latlong || !other.latlong) &&
+               (phong_facets || !other.phong_facets) && (light_tree || !other.light_tree);
     }
     constexpr bool operator==(const Features&) const = default;
 };
@@ -47,6 +50,7 @@ constexpr uint32_t bit(BsdfType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 
+/// All that a scene can have.
 constexpr Features kAllFeatures = {BsdfModels::kAll,
                                    EmitterModels::kAll,
                                    (1u << uint32_t(PrimitiveType::count)) - 1,

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/sha256.h"
+#include "scene/light_tree.h"
 
 namespace ambilux {
 
@@ -32,6 +33,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.phong_facets) names.push_back("phong microfacets");
     if (f.instances) names.push_back("instances");
     if (f.latlong) names.push_back("spherical sensor");
+    if (f.light_tree) names.push_back("light tree");
     return names;
 }
 
@@ -102,6 +104,7 @@ nlohmann::json scene_info(const Scene& scene) {
         {"texel_bytes", scene.texels.size()},
         {"emitters", emitters},
         {"memory_bytes", scene.memory_bytes()},
+        {"light_tree", {{"lights", light_leaf_count(scene)}, {"bytes", light_tree_bytes(scene)}}},
         {"bounds",
          {{"center", {scene.bounds_center.x, scene.bounds_center.y, scene.bounds_center.z}},
           {"radius", scene.bounds_radius}}},

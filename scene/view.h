@@ -180,6 +180,8 @@ struct Sensor {
 /// Materials that hits are told apart by when they are sorted.
 constexpr uint32_t kMostSortKeys = 0xfffe;
 
+struct LightTreeView;
+
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.
 struct SceneView {
     const MeshVertex* vertices;
@@ -206,7 +208,8 @@ struct SceneView {
     const Group* groups;
     const Instance* instances;  ///< first_id ascends
     uint32_t group_count, instance_count;
-    uint32_t instanced_count;  ///< primitives of all instances
+    uint32_t instanced_count;         ///< primitives of all instances
+    const LightTreeView* light_tree;  ///< Features::light_tree only (scene/light_tree.h)
 
     /// Primitive ids: 0..triangle_count-1 are triangles, then the quadrics, then those of instances.
     AMBILUX_HD uint32_t primitive_count() const { return triangle_count + quadric_count; }

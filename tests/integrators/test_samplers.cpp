@@ -8,6 +8,7 @@
 #include "core/sampling.h"
 #include "integrators/bdpt/wavefront/integrator.h"
 #include "integrators/path/integrator.h"
+#include "integrators/path/ris/integrator.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/third_sum.h"
 #include "tests/support/wave_film.h"
@@ -83,9 +84,9 @@ struct FickleLights {
         for (uint32_t i = 0; i < view.emitter_count; ++i) total += weight(view, r, i);
         return weight(view, r, emitter) / total;
     }
-    static Pick pick(const SceneView& view, const Receiver& r, float u) {
+    static Pick pick(const SceneView& view, const Receiver& r, Vec4f u) {
         uint32_t i = 0, last = 0;
-        for (float left = u; i < view.emitter_count; ++i) {
+        for (float left = u.x; i < view.emitter_count; ++i) {
             const float p = probability(view, r, i);
             if (p > 0.0f) last = i;
             if (left < p) break;
@@ -93,7 +94,7 @@ struct FickleLights {
         }
         return {last, probability(view, r, last) / view.emitters[last].pick_probability};
     }
-    static float over_power(const SceneView& view, const Receiver& r, uint32_t emitter) {
+    static float over_power(const SceneView& view, const Receiver& r, uint32_t emitter, uint32_t) {
         if (!kTells) return 1.0f;
         return probability(view, r, emitter) / view.emitters[emitter].pick_probability;
     }
@@ -234,6 +235,12 @@ using FicklePath = With<UnidirectionalMis, BsdfDirections, FickleLights<kTells>>
 template <bool kTells>
 using FickleBdpt = With<BidirectionalMis, BsdfDirections, FickleLights<kTells>>;
 
+using PathByTree = PathBy<ByTree<UnidirectionalMis>>;
+using BdptByTree = BdptBy<ByTree<BidirectionalMis>>;
+template <class Mis>
+using RisBy = PathIntegrator<kAllFeatures, CwbvhTracer, Fusion{.weigh = true, .connect = true}, ResampledNextEvent,
+                             RisSettings, Mis>;
+
 constexpr Case kDirectionCases[] = {{"cornell"}, {"materials", MisHeuristic::power}, {"glass"}};
 constexpr Case kLightCases[] = {{"lights"}, {"lights", MisHeuristic::power}, {"textured"}};
 
@@ -244,6 +251,15 @@ TEST_CASE("Directions half from the BSDF and half uniform give the same image, b
         check<PathBy<MixedPath<true>>, PathBy<UnidirectionalMis>>(c, "path");
         check<BdptBy<MixedBdpt<true>>, BdptBy<BidirectionalMis>>(c, "bdpt");
     }
+}
+
+TEST_CASE("Lights picked by a tree give the same image, by paths and bidirectionally") {
+    for (const Case& c : {Case{"lights"}, Case{"lights", MisHeuristic::power}, Case{"textured"}, Case{"glass"},
+                          Case{"bathroom", MisHeuristic::balance, 96}}) {
+        check<PathByTree, PathBy<UnidirectionalMis>>(c, "path");
+        check<BdptByTree, BdptBy<BidirectionalMis>>(c, "bdpt");
+    }
+    check<RisBy<ByTree<UnidirectionalMis>>, PathBy<UnidirectionalMis>>({"lights"}, "path");
 }
 
 TEST_CASE("Samplers that tell wrong densities are found") {

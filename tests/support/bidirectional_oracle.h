@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "transport/emitter/light_tree.h"
 #include "transport/mis/bidirectional.h"
 #include "transport/surface_scattering.h"
 
@@ -223,6 +224,22 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
         } else {
             steps.next_event = at_directions(to_light, to_light, conditioning,
                                              [&](Vec3f d, Vec3f) { return pdf_environment_direct<F>(scene, d); });
+        }
+        if (scene.light_tree) {
+            // Picked by the tree, for x_1. Rays know that place as well as they know where they began.
+            const auto over_power = [&](Vec3f at) -> double {
+                return LightsByTree::over_power(scene, {at, normal(1)}, path.emitter, path.light.prim);
+            };
+            OracleDensity& q = steps.next_event;
+            const double here = over_power(position(1));
+            q.value *= here;
+            if (conditioning)
+                for (int axis = 0; axis < 3; ++axis)
+                    for (float sign : {-1.0f, 1.0f}) {
+                        Vec3f moved = position(1);
+                        moved[axis] += sign * 4 * error(1)[axis];
+                        q.error += std::abs(over_power(moved) / here - 1);
+                    }
         }
     }
 

@@ -7,11 +7,13 @@
 #include <string>
 
 #include "accel/cwbvh.h"
+#include "accel/light_tree.h"
 #include "core/rng.h"
 #include "formats/load.h"
 #include "tests/support/bidirectional_oracle.h"
 #include "tests/support/catch.h"
 #include "tests/support/temp_folder.h"
+#include "transport/emitter/light_tree.h"
 #include "transport/mis/bidirectional.h"
 #include "transport/subpath/camera_connection.h"
 #include "transport/subpath/connection.h"
@@ -279,7 +281,9 @@ public:
     };
 
     Bench(const Scene& scene, Tally& tally)
-        : scene_(scene.view()), accel_(scene), tracer_(accel_.tracer()), tally_(tally) {}
+        : scene_(scene.view()), accel_(scene), tracer_(accel_.tracer()), tree_(scene), tally_(tally) {
+        if (std::is_same_v<typename Mis::Lights, LightsByTree>) scene_.light_tree = tree_.view();
+    }
 
     /// One light subpath and one eye subpath, and all paths that they make together.
     void run(const Mis& mis, uint32_t index) {
@@ -415,7 +419,8 @@ private:
         Candidate<Mis> c;
         if (!next_event<F>(scene_, rules_, z, {1, 1, 1}, b, u, c)) return;
         EmitterSample light;
-        REQUIRE(sample_emitter_deferred<F>(scene_, z.point.p, u, light));
+        typename Mis::Lights::Pick pick;
+        REQUIRE(sample_emitter_deferred<F>(scene_, rules_.lights, {z.point.p, z.point.ng}, u, light, pick));
         OraclePath p = join(0, b, -light.wi);
         p.emitter = light.emitter;
         p.light_p = light.p;
@@ -537,6 +542,7 @@ private:
     SceneView scene_;
     CwbvhAccel accel_;
     CwbvhTracer tracer_;
+    LightTree tree_;
     Tally& tally_;
     Mis mis_{};
     Rules<Mis> rules_{};
@@ -669,10 +675,13 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
             light.distance = infinite ? kInfinity : sqrtf(length_squared(position(0) - position(1)));
             light.pdf_sa = area ? pdf_emitter_direct<F>(scene_, path.emitter, position(1), light.wi, path.light)
                                 : (light.delta ? e.pick_probability : pdf_environment_direct<F>(scene_, light.wi));
+            const float over_power =
+                rules_.lights.over_power(scene_, Receiver{z[1].point.p, z[1].point.ng}, path.emitter, path.light.prim);
+            light.pdf_sa *= over_power;
             BsdfValue f{};
             f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
             f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
-            ratio = mis_.template next_event_ratio<F>(scene_, 1.0f, z[1].sums, z[1].first, light, f,
+            ratio = mis_.template next_event_ratio<F>(scene_, over_power, z[1].sums, z[1].first, light, f,
                                                       fabsf(dot(z[1].point.ng, light.wi)));
         } else {
             if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, candidate)) return;

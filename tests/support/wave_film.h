@@ -4,9 +4,11 @@
 #include <memory>
 #include <vector>
 
+#include "accel/light_tree.h"
 #include "backends/cpu/executor.h"
 #include "integrators/integrator.h"
 #include "tests/support/catch.h"
+#include "transport/emitter/light_tree.h"
 
 namespace ambilux {
 
@@ -24,7 +26,12 @@ std::vector<double> wave_film(const Scene& scene, const Tracer& tracer, const ty
     std::vector<Lane> samples(slots);
     std::vector<double> splats(size_t(wave.width) * wave.height * 3), sum(splats.size()), squares(splats.size());
     const FilmBuffers film = {samples.data(), {splats.data(), nullptr}, {sum.data(), squares.data()}};
-    const SceneView view = scene.view();
+    SceneView view = scene.view();
+    std::unique_ptr<LightTree> tree;
+    if constexpr (std::is_same_v<decltype(policy.rules.lights), LightsByTree>) {
+        tree = std::make_unique<LightTree>(scene);
+        view.light_tree = tree->view();
+    }
     const auto lay_out = [&](Layout& layout) {
         const auto memory = Integrator::lay_out(layout, policy, {slots, slots * 64});
         const WaveParts<Tracer> parts = {layout, view, tracer, wave, film};
