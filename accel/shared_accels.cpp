@@ -3,6 +3,7 @@
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "accel/faces.h"
+#include "accel/light_tree.h"
 
 namespace ambilux {
 
@@ -20,6 +21,12 @@ std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
 template <>
 std::shared_ptr<const Faces> SharedAccels::get() {
     return once(faces_, [&] { return host_ ? host_->get<Faces>() : std::make_shared<const Faces>(scene_); });
+}
+
+template <>
+std::shared_ptr<const LightTree> SharedAccels::get() {
+    return once(light_tree_,
+                [&] { return host_ ? host_->get<LightTree>() : std::make_shared<const LightTree>(scene_); });
 }
 
 }  // namespace ambilux

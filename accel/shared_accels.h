@@ -12,8 +12,10 @@ namespace ambilux {
 class CwbvhAccel;
 class EmbreeAccel;
 class Faces;
+class LightTree;
 class DeviceScene;
 class DeviceCwbvh;
+class DeviceLightTree;
 class HostTexels;
 
 /// Each is made when it is first asked for, by whichever thread, and lives as long as this object or a renderer that
@@ -31,8 +33,8 @@ public:
         if (host_) host_->place_textures(where);
     }
 
-    /// `T`: CwbvhAccel, EmbreeAccel, Faces; in builds with CUDA also DeviceScene, DeviceCwbvh, HostTexels
-    /// (backends/cuda/device_scene.h).
+    /// `T`: CwbvhAccel, EmbreeAccel, Faces, LightTree; in builds with CUDA also DeviceScene, DeviceCwbvh,
+    /// DeviceLightTree, HostTexels (backends/cuda/device_scene.h).
     template <class T>
     std::shared_ptr<const T> get();
 
@@ -52,8 +54,10 @@ private:
     std::shared_ptr<const CwbvhAccel> cwbvh_;
     std::shared_ptr<const EmbreeAccel> embree_;
     std::shared_ptr<const Faces> faces_;
+    std::shared_ptr<const LightTree> light_tree_;
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> device_cwbvh_;
+    std::shared_ptr<const DeviceLightTree> device_light_tree_;
     std::shared_ptr<const HostTexels> host_texels_;
 };
 
@@ -63,5 +67,7 @@ template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get<EmbreeAccel>();
 template <>
 std::shared_ptr<const Faces> SharedAccels::get<Faces>();
+template <>
+std::shared_ptr<const LightTree> SharedAccels::get<LightTree>();
 
 }  // namespace ambilux

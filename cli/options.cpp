@@ -39,7 +39,9 @@ void SceneOptions::add_to(CLI::App& command) {
     command.add_option("-D,--define", parameters, "Value of a $parameter of the scene")
         ->allow_extra_args(false)
         ->type_name("NAME=VALUE");
-    command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")
+    command
+        .add_option("--light-picking", light_picking,
+                    "How light sampling chooses an emitter: power, uniform or tree (setting light_picking)")
         ->capture_default_str();
     command
         .add_option("--limits", limits,
@@ -54,8 +56,11 @@ LoadOptions SceneOptions::load_options() const {
     options.lenient = lenient;
     if (light_picking == "uniform")
         options.light_picking = LightPicking::uniform;
+    else if (light_picking == "tree")
+        options.light_picking = LightPicking::tree;
     else if (light_picking != "power")
-        throw Error(ExitCode::usage, fmt::format("--light-picking {}: power and uniform are known", light_picking));
+        throw Error(ExitCode::usage,
+                    fmt::format("--light-picking {}: power, uniform and tree are known", light_picking));
     if (!size.empty()) {
         const char* end = size.data() + size.size();
         const auto width = std::from_chars(size.data(), end, options.width);

@@ -17,7 +17,7 @@ function(read_levels variable result)
   if(NOT All IN_LIST levels)
     message(FATAL_ERROR "${variable}=${${variable}} needs All, for scenes that no other level covers")
   endif()
-  set(${result} ${levels} PARENT_SCOPE)
+  set(${result} ${levels} ${AMBILUX_NAMED_LEVELS} PARENT_SCOPE)
 endfunction()
 
 function(instantiate target table replays)

@@ -1,5 +1,7 @@
 # What follows from integrators/registry.list and from the lists of methods outside of the tree (docs/extending.md).
 set(AMBILUX_LEVELS Diffuse Untextured Triangle Masked Common Flat All)
+# Levels that a line has to name. They are compiled wherever All is.
+set(AMBILUX_NAMED_LEVELS Tree)
 
 # read_registry(): sets `entries` to one "integrator|variant|folder|NAME|unit|level level ...|list:line" for each line of
 # all lists. `folder` is what generated sources include headers from, `outside` the folders with sources of their own.
@@ -43,6 +45,10 @@ function(read_list path prefix)
     set(levels ${AMBILUX_LEVELS})
     if(count GREATER 5)
       list(SUBLIST fields 5 -1 levels)
+      if("${levels}" MATCHES "^\\+")
+        list(TRANSFORM levels REPLACE "^\\+" "")
+        list(PREPEND levels ${AMBILUX_LEVELS})
+      endif()
     endif()
     check_line("${names}" "${levels}")
     list(GET names 2 folder)
@@ -77,9 +83,9 @@ function(check_line names levels)
     endif()
   endforeach()
   set(unknown ${levels})
-  list(REMOVE_ITEM unknown ${AMBILUX_LEVELS})
+  list(REMOVE_ITEM unknown ${AMBILUX_LEVELS} ${AMBILUX_NAMED_LEVELS})
   if(unknown)
-    message(FATAL_ERROR "${place}: '${unknown}' is no feature level; they are ${AMBILUX_LEVELS}")
+    message(FATAL_ERROR "${place}: '${unknown}' is no feature level; they are ${AMBILUX_LEVELS} ${AMBILUX_NAMED_LEVELS}")
   elseif(NOT All IN_LIST levels)
     message(FATAL_ERROR "${place}: '${integrator} ${variant}' needs level All, for scenes that no other level covers")
   endif()

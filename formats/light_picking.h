@@ -6,8 +6,15 @@
 
 namespace ambilux {
 
-enum class LightPicking : uint32_t { power, uniform };
-inline const char* name_of(LightPicking picking) { return picking == LightPicking::uniform ? "uniform" : "power"; }
+enum class LightPicking : uint32_t {
+    power,
+    uniform,
+    tree,  ///< as power; renders shall pick by a tree besides (setting light_picking)
+};
+inline const char* name_of(LightPicking picking) {
+    constexpr const char* kNames[] = {"power", "uniform", "tree"};
+    return kNames[uint32_t(picking)];
+}
 
 /// Share of all picks that finite emitters get at least, and that emitters at infinity get at least, where there are
 /// both. Powers of the two do not compare: how much light comes from infinity depends on how the scene is closed, which

@@ -48,6 +48,13 @@ constexpr Features kFlatFeatures = [] {
     return f;
 }();
 
+/// All, and lights picked by a tree. The level is compiled for the methods that name it (integrators/registry.list).
+constexpr Features kTreeFeatures = [] {
+    Features f = kAllFeatures;
+    f.light_tree = true;
+    return f;
+}();
+
 /// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
 /// is false.
 template <class Function>

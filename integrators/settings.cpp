@@ -76,6 +76,7 @@ bool sorts(const VariantTraits& v, bool) { return v.sorts; }
 bool compacts(const VariantTraits& v, bool) { return v.compacts; }
 bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
 bool has_binary_bvh(const VariantTraits& v, bool cuda) { return v.binary_bvh && cuda; }
+bool has_light_tree(const VariantTraits& v, bool) { return v.light_tree; }
 bool has_twin(const VariantTraits& v, bool cuda) { return v.in_double && !cuda; }
 bool on_cpu(const VariantTraits&, bool cuda) { return !cuda; }
 bool on_cuda(const VariantTraits&, bool cuda) { return cuda; }
@@ -145,6 +146,12 @@ std::vector<Setting> estimator_settings() {
             .key_of_runs()
             .image_attribute()
             .leaves_out(),
+        Is(Of::choice("light_picking", &S::light_picking, {"table", "tree"},
+                      "how next event estimation picks an emitter: by the table of the scene (option --light-picking), "
+                      "or by a tree over the lights that knows the receiver (Conty Estevez and Kulla 2018)"))
+            .limit("tree", has_light_tree, "its kernels pick emitters by the table alone")
+            .not_with_auto("its pilot predicts for emitters picked by the table; render with the settings that it "
+                           "chooses and this one"),
         Is(Of::choice("heuristic", &S::heuristic, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)},
                       "heuristic of multiple importance sampling"))
             .where(weighs, "nothing is weighted")

@@ -65,11 +65,18 @@ enum class Allow : uint32_t {
     consistent,  ///< and what is biased, but converges to the right image
 };
 
+/// How next event estimation picks an emitter. Light subpaths begin by the scene's table in either case.
+enum class LightPicks : uint32_t {
+    table,  ///< by the table of the scene, which was loaded by power or uniform, whatever the receiver
+    tree,   ///< by what lights can bring to the receiver (scene/light_tree.h)
+};
+
 struct RenderSettings {
     std::string integrator = "path", variant = "wavefront";  ///< names of a Variant (registry.h)
     Choice<Backend> backend = Backend::automatic;
     Precision precision = Precision::single;
     Estimator estimator = Estimator::mis;
+    LightPicks light_picking = LightPicks::table;
     MisHeuristic heuristic = MisHeuristic::balance;
     uint32_t strategies = kAllStrategies;  ///< StrategyBits
     SingleStrategies singles;              ///< if on, these and not the groups

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "accel/faces.h"
+#include "accel/light_tree.h"
 #include "accel/shared_accels.h"
 #include "backends/cpu/executor.h"
 #include "backends/cpu/host_memory.h"
@@ -56,6 +57,11 @@ public:
         faces_ = accels.get<Faces>();
         maker_.view.faces = faces_->data();
         accel_bytes_ += faces_->memory_bytes();
+        if constexpr (F.light_tree) {
+            light_tree_ = accels.get<LightTree>();
+            maker_.view.light_tree = light_tree_->view();
+            accel_bytes_ += light_tree_->memory_bytes();
+        }
         return maker_.tracer;
     }
     void upload(SharedAccels&) {}
@@ -297,6 +303,7 @@ private:
     tbb::task_arena arena_{int(threads())};
     std::shared_ptr<const void> accel_;
     std::shared_ptr<const Faces> faces_;
+    std::shared_ptr<const LightTree> light_tree_;  ///< Features::light_tree only
     std::vector<OwnWave> waves_;
     WaveState film_state_{};
     std::atomic<uint64_t> held_ = 0, peak_ = 0;  ///< bytes, by all waves and all else

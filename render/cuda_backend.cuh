@@ -38,17 +38,9 @@ public:
 
     /// The structure on the host, and what the pilot traces with.
     HostTracer find_structure(SharedAccels& accels) {
-        if (maker_.settings.accel == AccelKind::bvh2) {
-            host_pairs_.emplace(maker_.scene);
-            accel_bytes_ = host_pairs_->arrays().bytes();
-            return {};
-        }
-        const auto accel = accels.get<CwbvhAccel>();
-        accel_bytes_ = accel->arrays().bytes();
-        if constexpr (requires { Stages::kTracesConnections; })
-            maker_.policy.traces_connections =
-                Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
-        return HostTracer(accel->tracer());
+        const HostTracer tracer = find_tracer(accels);
+        if constexpr (F.light_tree) accel_bytes_ += light_tree_bytes(maker_.scene);
+        return tracer;
     }
     void upload(SharedAccels& accels) {
         device_scene_ = accels.get<DeviceScene>();
@@ -61,12 +53,17 @@ public:
             accel_ = accels.get<DeviceCwbvh>();
             maker_.tracer = accel_->tracer();
         }
+        if constexpr (F.light_tree) {
+            light_tree_ = accels.get<DeviceLightTree>();
+            maker_.view.light_tree = light_tree_->view();
+        }
         device_scene_->drop_texels();
     }
     SceneBytes scene_bytes() const { return ambilux::scene_bytes(maker_.scene, maker_.settings.textures); }
     uint64_t accel_bytes() const { return accel_bytes_; }
     uint64_t resident_scene_bytes() const {
-        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes());
+        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) +
+               (light_tree_ ? light_tree_->bytes() : 0);
     }
     /// A clock, and an image that may be asked for.
     uint64_t other_bytes() const { return sizeof(uint64_t) + image_bytes(); }
@@ -137,6 +134,19 @@ public:
     }
 
 private:
+    HostTracer find_tracer(SharedAccels& accels) {
+        if (maker_.settings.accel == AccelKind::bvh2) {
+            host_pairs_.emplace(maker_.scene);
+            accel_bytes_ = host_pairs_->arrays().bytes();
+            return {};
+        }
+        const auto accel = accels.get<CwbvhAccel>();
+        accel_bytes_ = accel->arrays().bytes();
+        if constexpr (requires { Stages::kTracesConnections; })
+            maker_.policy.traces_connections =
+                Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
+        return HostTracer(accel->tracer());
+    }
     /// What is launched for each wave of a phase.
     struct Phase {
         Owned<cudaGraphExec_t> graph;
@@ -333,6 +343,7 @@ private:
     std::string device_name_ = cuda_device_name();  ///< asked for once: statistics are read often
     std::optional<PairAccel> host_pairs_;           ///< until they are on the device
     std::shared_ptr<const DeviceScene> device_scene_;
+    std::shared_ptr<const DeviceLightTree> light_tree_;  ///< Features::light_tree only
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
     uint64_t accel_bytes_ = 0, held_ = 0, peak_ = 0;

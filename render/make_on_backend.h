@@ -42,6 +42,9 @@ std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make)
             else
                 return make.template operator()<kNoFusion>();
         }
+    if constexpr (F.light_tree)
+        if (settings.fuse == Fuse::none)
+            throw Error(ExitCode::usage, "fuse=none: there are no such kernels with light_picking=tree");
     return make.template operator()<kFused>();
 }
 

@@ -7,6 +7,7 @@
 #include "render/selection.h"
 #include "render/shared_renderer.h"
 #include "render/twin/twin.h"
+#include "scene/light_tree.h"
 
 namespace ambilux {
 namespace {
@@ -26,14 +27,16 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
 
 /// The smallest level of features that covers the scene, of those that the backend is compiled for.
 CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderSettings& s) {
-    const Features needed = s.specialise && s.fuse != Fuse::none ? scene.features : kAllFeatures;
+    Features needed = s.specialise && s.fuse != Fuse::none ? scene.features : kAllFeatures;
+    needed.light_tree = s.light_picking == LightPicks::tree && light_tree_pays(scene);
     const Variant& variant = variant_of(s);
     for (const CompiledRenderer& r : compiled_renderers()) {
         const CompiledRenderer::Make make = cuda ? r.cuda : r.cpu;
         if (make && r.integrator == variant.integrator && r.variant == variant.variant && r.level.covers(needed))
             return make;
     }
-    throw Error(ExitCode::usage, fmt::format("{}: integrators/registry.list has no level All for it", variant.name()));
+    throw Error(ExitCode::usage, fmt::format("{}: integrators/registry.list has no level {} for it", variant.name(),
+                                             needed.light_tree ? "Tree" : "All"));
 }
 
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
@@ -48,6 +51,8 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     const bool cuda = settings.backend == Backend::cuda || (open && cuda_available());
     check_settings(settings, variant, cuda);
     accels.place_textures(settings.textures);
+    if (in_double && settings.light_picking == LightPicks::tree)
+        throw Error(ExitCode::usage, "light_picking=tree: precision=double picks emitters by the table alone");
     if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
         return make_automatic(scene, settings, cuda, accels,

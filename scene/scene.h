@@ -30,7 +30,8 @@ struct Scene {
     std::vector<std::string> notes;     ///< what is done in another way than the file says, with the same image
     uint64_t degenerate_triangles = 0;  ///< triangles without area that the loader left out
     IntegratorHint integrator;
-    std::string light_picking = "power";  ///< how next event estimation and light subpaths choose an emitter
+    std::string light_picking = "power";  ///< how next event estimation and light subpaths choose an emitter; tree: by
+                                          ///< power, and renders shall have light_picking=tree
 
     std::vector<MeshVertex> vertices;
     std::vector<Triangle> triangles;

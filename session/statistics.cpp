@@ -91,6 +91,12 @@ nlohmann::json settings_json(const RenderSettings& settings) {
     return json;
 }
 
+/// How next event estimation picks emitters: power, uniform or tree.
+static std::string light_picking_text(const Scene& scene, const RenderSettings& used) {
+    if (used.light_picking == LightPicks::tree) return "tree";
+    return scene.light_picking == "tree" ? "power" : scene.light_picking;
+}
+
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const RenderStats& stats,
                           double load_seconds) {
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
@@ -119,7 +125,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
          {"device", stats.device},
          {"accel", stats.accel},
          {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
-         {"light_picking", scene.light_picking},
+         {"light_picking", light_picking_text(scene, used)},
          {"spp", stats.samples},
          {"wave_paths", stats.wave_paths},
          {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
@@ -142,7 +148,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
 Attributes image_attributes(const Scene& scene, const RenderSettings& asked, const RenderStats& stats) {
     Attributes attributes = {{"scene", scene.path},
                              {"scene_hash", scene_hash(scene)},
-                             {"light_picking", scene.light_picking},
+                             {"light_picking", light_picking_text(scene, stats.settings)},
                              {"spp", stats.samples},
                              {"wave_paths", uint64_t(stats.wave_paths)},
                              {"backend", stats.backend},

@@ -46,6 +46,17 @@ DevicePairs::DevicePairs(const PairArrays& arrays)
     : nodes_(arrays.nodes, "acceleration structure on the device"),
       primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
 
+DeviceLightTree::DeviceLightTree(const LightTree& tree)
+    : nodes_(tree.nodes(), "light tree on the device"), leaves_(tree.leaves(), "lights on the device"),
+      first_leaf_(tree.first_leaf(), "lights on the device"), beside_(tree.beside(), "lights on the device") {
+    LightTreeView view = *tree.view();
+    view.nodes = nodes_.data();
+    view.leaves = leaves_.data();
+    view.first_leaf = first_leaf_.data();
+    view.beside = beside_.data();
+    view_ = DeviceBuffer<LightTreeView>(std::vector<LightTreeView>{view}, "light tree on the device");
+}
+
 template <>
 std::shared_ptr<const HostTexels> SharedAccels::get() {
     return once(host_texels_, [&] {
@@ -59,7 +70,9 @@ std::shared_ptr<const DeviceScene> SharedAccels::get() {
         // With the structure, if it is made: it comes next.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
-        check_scene_fits(scene_, textures_, cwbvh_ ? cwbvh_->memory_bytes() : 0, free, total, cuda_device_name());
+        const uint64_t accel_bytes =
+            (cwbvh_ ? cwbvh_->memory_bytes() : 0) + (light_tree_ ? light_tree_->memory_bytes() : 0);
+        check_scene_fits(scene_, textures_, accel_bytes, free, total, cuda_device_name());
         const bool on_host = textures_ != TextureMemory::device;
         return std::make_shared<const DeviceScene>(scene_, on_host ? get<HostTexels>() : nullptr);
     });
@@ -68,6 +81,11 @@ std::shared_ptr<const DeviceScene> SharedAccels::get() {
 template <>
 std::shared_ptr<const DeviceCwbvh> SharedAccels::get() {
     return once(device_cwbvh_, [&] { return std::make_shared<const DeviceCwbvh>(get<CwbvhAccel>()->arrays()); });
+}
+
+template <>
+std::shared_ptr<const DeviceLightTree> SharedAccels::get() {
+    return once(device_light_tree_, [&] { return std::make_shared<const DeviceLightTree>(*get<LightTree>()); });
 }
 
 }  // namespace ambilux

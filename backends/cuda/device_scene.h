@@ -2,6 +2,7 @@
 #pragma once
 
 #include "accel/cwbvh.h"
+#include "accel/light_tree.h"
 #include "accel/pair_bvh.h"
 #include "accel/shared_accels.h"
 #include "backends/cuda/device_memory.h"
@@ -79,11 +80,34 @@ private:
     uint32_t root_;
 };
 
+/// A tree over lights on the device.
+class DeviceLightTree {
+public:
+    explicit DeviceLightTree(const LightTree& tree);
+    DeviceLightTree(const DeviceLightTree&) = delete;
+    DeviceLightTree& operator=(const DeviceLightTree&) = delete;
+
+    /// For SceneView::light_tree, in device code only; valid as long as this object.
+    const LightTreeView* view() const { return view_.data(); }
+    /// What light_tree_bytes() predicts.
+    uint64_t bytes() const {
+        return nodes_.bytes() + leaves_.bytes() + first_leaf_.bytes() + beside_.bytes() + view_.bytes();
+    }
+
+private:
+    DeviceBuffer<LightNode> nodes_;
+    DeviceBuffer<LightLeaf> leaves_;
+    DeviceBuffer<uint32_t> first_leaf_, beside_;
+    DeviceBuffer<LightTreeView> view_;
+};
+
 template <>
 std::shared_ptr<const HostTexels> SharedAccels::get<HostTexels>();
 template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get<DeviceScene>();
 template <>
 std::shared_ptr<const DeviceCwbvh> SharedAccels::get<DeviceCwbvh>();
+template <>
+std::shared_ptr<const DeviceLightTree> SharedAccels::get<DeviceLightTree>();
 
 }  // namespace ambilux

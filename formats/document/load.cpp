@@ -23,7 +23,7 @@ std::array<uint8_t, 32> content_hash(const Builder& builder) {
     for (const auto& [path, digest] : builder.file_digests) hash.update(digest.data(), digest.size());
     const LoadOptions& o = builder.options;
     add(std::to_string(o.width) + " " + std::to_string(o.height) + " " + std::to_string(o.lenient) + " " +
-        std::to_string(int(o.light_picking)));
+        std::to_string(o.light_picking == LightPicking::uniform));
     for (const auto& [name, value] : o.parameters) {
         add(name);
         add(value);

@@ -10,6 +10,7 @@ struct PathVariant {
         "unidirectional path tracer: hits of emitters, next event estimation, or both with weights";
     static constexpr VariantTraits kTraits = {.estimators = true,
                                               .binary_bvh = true,
+                                              .light_tree = true,
                                               .in_double = true,
                                               .replay = ReplayPairing::none,
                                               .references = References::plain};

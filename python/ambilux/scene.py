@@ -58,7 +58,7 @@ class Scene:
     def _load(self, path: str, text: str | None, defines: Mapping[str, Any], size: tuple[int, int] | None, lenient: bool, light_picking: str,
               limits: Mapping[str, int | str] | None) -> None:
         if light_picking not in ("power", "uniform"):
-            raise UsageError(f"light_picking {light_picking!r}: power and uniform are known")
+            raise UsageError(f"light_picking {light_picking!r}: power and uniform are known, and tree is a setting of renders")
         self._source = (path, text, dict(defines), lenient, light_picking, limits)
         self._core = _core.load(path, text, [(k, setting_text(v)) for k, v in defines.items()], checked_size(size), lenient, light_picking == "uniform",
                                 [f"{k}={v}" for k, v in (limits or {}).items()])

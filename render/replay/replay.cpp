@@ -22,6 +22,8 @@ void check_replay(const RenderSettings& settings) {
         throw Error(ExitCode::usage,
                     "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that "
                     "`ambilux render` printed as its selection");
+    if (settings.light_picking == LightPicks::tree)
+        throw Error(ExitCode::usage, "light_picking=tree: a replay picks emitters by the table of the scene alone");
     if (variant.traits.replay != ReplayPairing::no_replay) return;
     const auto have = [](const VariantTraits& v) { return v.replay != ReplayPairing::no_replay; };
     const std::vector<std::string> others = variants_that(have, variant.integrator);

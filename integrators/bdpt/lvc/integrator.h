@@ -3,6 +3,7 @@
 #pragma once
 
 #include "integrators/bdpt/shared/two_sides.h"
+#include "transport/mis/by_tree.h"
 
 namespace ambilux {
 
@@ -42,6 +43,6 @@ struct LvcOf {
     }
 };
 template <Features F, class Tracer, Fusion kFusion>
-using LvcIntegrator = LvcOf<F, Tracer, kFusion, BidirectionalMis>;
+using LvcIntegrator = LvcOf<F, Tracer, kFusion, PickingMis<F, BidirectionalMis>>;
 
 }  // namespace ambilux

@@ -14,6 +14,7 @@ struct LvcVariant {
                                               .draws_together = true,
                                               .strategy_images = true,
                                               .repeats = false,
+                                              .light_tree = true,
                                               .replay = ReplayPairing::cache,
                                               .references = References::as_it_is};
 

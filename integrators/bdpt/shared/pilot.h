@@ -18,7 +18,13 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
 template <Features F, class Mis>
     requires(!std::is_same_v<Mis, BidirectionalMis>)
 double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed) {
-    return mean_light_vertices<F>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);
+    // Light subpaths begin by power, whatever next event estimation does.
+    constexpr Features kOwn = [] {
+        Features f = F;
+        f.light_tree = false;
+        return f;
+    }();
+    return mean_light_vertices<kOwn>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);
 }
 
 }  // namespace ambilux

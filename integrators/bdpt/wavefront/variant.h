@@ -12,6 +12,7 @@ struct WavefrontVariant {
     static constexpr VariantTraits kTraits = {.strategies = true,
                                               .light_subpaths = true,
                                               .strategy_images = true,
+                                              .light_tree = true,
                                               .in_double = true,
                                               .selects_any = true,
                                               .replay = ReplayPairing::own_subpath,
