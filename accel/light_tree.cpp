@@ -26,7 +26,9 @@ float angle_between(Vec3f a, Vec3f b) { return std::atan2(length(cross(a, b)), d
 Cone join(Cone a, Cone b) {
     if (a.theta_o < b.theta_o) std::swap(a, b);
     if (b.theta_o < 0) return a;
-    const float theta_e = std::max(a.theta_e, b.theta_e), between = angle_between(a.axis, b.axis);
+    const float theta_e = std::max(a.theta_e, b.theta_e);
+    if (a.theta_o >= kPi) return {a.axis, kPi, theta_e};
+    const float between = angle_between(a.axis, b.axis);
     if (std::min(between + b.theta_o, kPi) <= a.theta_o) return {a.axis, a.theta_o, theta_e};
     const float theta_o = 0.5f * (a.theta_o + between + b.theta_o), turn = theta_o - a.theta_o;
     if (!(theta_o < kPi)) return {a.axis, kPi, theta_e};
@@ -220,13 +222,19 @@ private:
             for (int axis = 0; axis < 3; ++axis) {
                 if (!(extent[axis] > 0)) continue;
                 const auto& of = bins.of[size_t(axis)];
-                std::array<double, kBins> behind{};  // of all bins from one on
+                std::array<double, kBins + 1> behind{};  // of all bins from one on
                 Light some;
-                for (uint32_t b = kBins; b-- > 1;) some.add(of[b]), behind[b] = cost(some);
+                uint32_t last = 0;  // that holds a light
+                for (uint32_t b = kBins; b-- > 1;) {
+                    behind[b] = behind[b + 1];
+                    if (!(of[b].energy > 0)) continue;
+                    some.add(of[b]), behind[b] = cost(some);
+                    last = std::max(last, b);
+                }
                 some = {};
-                for (uint32_t b = 1; b < kBins; ++b) {
+                for (uint32_t b = 1; b <= last; ++b) {
+                    if (!(of[b - 1].energy > 0)) continue;  // no other split than the one before
                     some.add(of[b - 1]);
-                    if (!(some.energy > 0) || !(behind[b] > 0 || of[b].energy > 0)) continue;
                     const double c = (cost(some) + behind[b]) * double(longest / extent[axis]);
                     if (best_axis < 0 || c < least) least = c, best_axis = axis, best_bin = b;
                 }

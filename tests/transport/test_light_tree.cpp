@@ -4,7 +4,9 @@
 
 #include <tbb/task_arena.h>
 
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 #include "accel/light_tree.h"
@@ -260,6 +262,26 @@ TEST_CASE("Lights in one place, in a row and far more of them than levels have a
             CHECK(std::abs(sum - 1) < 1e-5);
         }
     }
+}
+
+TEST_CASE("A tree over a million lights is built within seconds", "[.bench]") {
+    Scene scene;
+    for (uint32_t i = 0; i < 1000000; ++i) {
+        Emitter e{};
+        const Vec4f u = random(i, 6);
+        e.type = i % 2 ? EmitterType::point : EmitterType::spot;
+        e.position = {100 * u.x, 3 * u.y, 10 * u.z};
+        e.direction = any_direction(i);
+        e.cutoff = 0.7f, e.beam_width = 0.5f;
+        e.pick_probability = 1e-6f;
+        scene.emitters.push_back(e);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const LightTree tree(scene);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::printf("%zu lights: %.2f s, %.0f MiB\n", tree.leaves().size(), seconds,
+                double(tree.memory_bytes()) / double(1 << 20));
+    CHECK(seconds < 60);
 }
 
 TEST_CASE("A tree is made where it has something to choose from") {
