@@ -96,17 +96,15 @@ Light whole_light(const SceneView& view, const Emitter& e) {
         return all;
     }
     const Bounds3f at = {e.position, e.position};
-    const auto beam = [&](Vec3f axis, float angle, double energy) -> Light {
+    const auto beam = [&](Vec3f axis, float angle) -> Light {
         const float theta_e = std::min(angle, kPi / 2);
-        return {at, {normalize(axis), std::min(angle - theta_e, kPi), theta_e}, energy};
+        return {at, {normalize(axis), std::min(angle - theta_e, kPi), theta_e}, power / M_PI};
     };
-    if (e.type == EmitterType::spot) {
-        const auto one_minus_cos = [](double angle) { return 2 * sqr(std::sin(angle / 2)); };
-        return beam(e.direction, e.cutoff, power / (M_PI * (one_minus_cos(e.cutoff) + one_minus_cos(e.beam_width))));
-    }
+    // Narrow ones are brighter than a flat lamp of their power, where they shine. Few receivers lie there, and the
+    // nodes above do not know which: with that energy they would lead all others here too.
+    if (e.type == EmitterType::spot) return beam(e.direction, e.cutoff);
     if (e.type == EmitterType::projector)
-        return beam(e.to_world.vector({0, 0, 1}), std::atan(std::hypot(e.cutoff, e.beam_width)),
-                    power / (4.0 * e.cutoff * e.beam_width));
+        return beam(e.to_world.vector({0, 0, 1}), std::atan(std::hypot(e.cutoff, e.beam_width)));
     return {at, {{0, 0, 1}, kPi, kPi / 2}, power / (4 * M_PI)};
 }
 

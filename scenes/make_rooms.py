@@ -66,8 +66,10 @@ def lamp(kind, at, towards, size, power, color):
         return [c * value for c in color]
 
     center = f'<point name="{{}}" x="{at[0]:.5g}" y="{at[1]:.5g}" z="{at[2]:.5g}"/>'
-    if kind in ("rectangle", "hiddenarea"):
-        return f'<shape type="rectangle">{looking(at, towards, size)}<ref id="black"/>{lit(4 * size * size, "hiddenarea" if kind == "hiddenarea" else "area")}</shape>'
+    if kind == "rectangle":
+        return f'<shape type="rectangle">{looking(at, towards, size)}<ref id="black"/>{lit(4 * size * size)}</shape>'
+    if kind == "hiddenarea":
+        return f'<shape type="rectangle">{looking(at, towards, size)}<bsdf type="null"/>{lit(4 * size * size, "hiddenarea")}</shape>'
     if kind == "disk":
         return f'<shape type="disk">{looking(at, towards, size)}<ref id="black"/>{lit(math.pi * size * size)}</shape>'
     if kind == "cube":

@@ -160,7 +160,7 @@ TEST_CASE("G13: every accepted option changes something") {
     CHECK(bool(read_file(folder / "a.png") != read_file(folder / "b.png")));
 
     // Light picking shows where there are several lights.
-    for (const char* picking : {"power", "uniform"}) {
+    for (const char* picking : {"power", "uniform", "tree"}) {
         const Outcome o = run(folder, {"render", kScenes + "lights.xml", "--size", "24x16", "--spp", "2",
                                        "--light-picking", picking, "-o", folder / (picking + std::string(".exr"))});
         INFO(o.err);
@@ -170,6 +170,11 @@ TEST_CASE("G13: every accepted option changes something") {
         CHECK(told["light_picking"] == picking);
     }
     CHECK(bool(read_exr(folder / "power.exr").rgb != read_exr(folder / "uniform.exr").rgb));
+    CHECK(bool(read_exr(folder / "power.exr").rgb != read_exr(folder / "tree.exr").rgb));
+    const Outcome best =
+        run(folder, {"render", kScenes + "lights.xml", "--light-picking", "best", "-o", folder / "n.exr"});
+    CHECK(best.code == 2);
+    CHECK(contains(best.err, "power, uniform and tree are known"));
 
     // Lenient: refused without, listed with.
     std::string text = read_file(kCornell);

@@ -4,6 +4,7 @@
 // enumerated, merges among them.
 #include "integrators/bdpt/vcm/merging_directions.h"
 #include "tests/support/bidirectional_paths.h"
+#include "transport/mis/by_tree.h"
 
 namespace ambilux {
 
@@ -35,6 +36,14 @@ TEST_CASE("The same where the radius is as large as a pixel at the first vertex 
         return mis;
     });
     CHECK(seen.at("merges") > 5000);
+}
+
+TEST_CASE("So they do where next event estimation picks lights by a tree") {
+    const MergeNow now[] = {{0.01f, 0x1p-10f}, {0.1f, 1.0f}, {0.5f, 300.0f}};
+    const std::map<std::string, uint64_t> seen = compare_weights(
+        0.05, [&](uint32_t i) { return ByTree<MergingMis>{{settings(i), &now[i / 16 % 3], i / 48 % 2 == 0}}; });
+    CHECK(seen.at("merges") > 10000);
+    CHECK(seen.at("next event, perspective") >= 20);
 }
 
 TEST_CASE("Where merges are alone, their weights sum to one, and hits count where none is possible") {

@@ -67,7 +67,9 @@ struct CoarseNormal {
 private:
     static constexpr int32_t kMost = 511;
 
-    AMBILUX_HD static uint32_t word(float x) { return uint32_t(int32_t(rintf(x * float(kMost))) + kMost) & 1023u; }
+    AMBILUX_HD static uint32_t word(float x) {
+        return uint32_t(int32_t(floorf(x * float(kMost) + 0.5f)) + kMost) & 1023u;
+    }
     AMBILUX_HD static float number(uint32_t w) { return float(int32_t(w & 1023u) - kMost) * (1.0f / float(kMost)); }
 };
 
