@@ -24,7 +24,8 @@ def rgb(name, color):
 
 
 def looking(origin, target, size=1.0):
-    up = (0, 1, 0) if abs(origin[0] - target[0]) + abs(origin[2] - target[2]) > 1e-3 else (0, 0, 1)
+    x, y, z = (abs(a - b) for a, b in zip(origin, target))
+    up = (0, 1, 0) if x + z > 0.1 * y else (0, 0, 1)  # not along the way
     return f'<transform name="to_world"><scale value="{size:.5g}"/><lookat origin="{text(*origin)}" target="{text(*target)}" up="{text(*up)}"/></transform>'
 
 

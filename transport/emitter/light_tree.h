@@ -31,8 +31,8 @@ AMBILUX_HD AngleParts angle_of(float cosine) {
 /// energy / distance², with the least angles that the sphere around them allows at either end.
 AMBILUX_HD float light_importance(const LightNode& node, Vec3f p, Vec3f n) {
     const Vec3f to = node.center - p;
-    const float d2 = fmaf(to.x, to.x, fmaf(to.y, to.y, to.z * to.z)), r2 = node.radius * node.radius;
-    if (d2 <= r2) return node.energy / max(r2, 1e-30f);
+    const float d2 = fmaf(to.x, to.x, fmaf(to.y, to.y, to.z * to.z)), r2 = max(node.radius * node.radius, 1e-30f);
+    if (d2 <= r2) return node.energy / r2;
     const float inv = 1.0f / sqrtf(d2), sine = node.radius * inv;
     const AngleParts spread = {safe_sqrt(fmaf(-sine, sine, 1.0f)), sine};
     const float along = fmaf(node.axis.x, to.x, fmaf(node.axis.y, to.y, node.axis.z * to.z)) * -inv;
