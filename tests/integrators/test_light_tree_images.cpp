@@ -8,6 +8,7 @@
 #include "render/replay/replay.h"
 #include "scene/light_tree.h"
 #include "tests/support/closed_forms.h"
+#include "tests/support/many_lights.h"
 
 using namespace ambilux;
 
@@ -45,7 +46,7 @@ std::string rooms(int count) {
     std::string s =
         "<sensor type='perspective'><float name='fov' value='70'/><transform name='to_world'><lookat "
         "origin='0.3,1,0.8' target='2,0.8,-0.6' up='0,1,0'/></transform>" +
-        square_film(24) + "</sensor>";
+        square_film(16) + "</sensor>";
     s += shape("cube", fmt::format("<scale x='{}' y='1' z='1'/><translate x='{}' y='1'/>", count, count),
                "<boolean name='flip_normals' value='true'/>" + diffuse({0.6f, 0.6f, 0.6f}));
     for (int i = 0; i < count; ++i) {
@@ -56,6 +57,22 @@ std::string rooms(int count) {
                    area_light({9, 9, 9}));
         s += shape("sphere", fmt::format("<scale value='0.04'/><translate x='{}' y='1.2' z='-0.5'/>", 2 * i + 0.5),
                    area_light({5, 7, 9}));
+    }
+    return scene_xml(3, s);
+}
+
+/// A floor under lamps of all kinds that a path tracer finds.
+std::string many_kinds() {
+    std::string s =
+        "<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat "
+        "origin='0,1.2,2.5' target='0,0,0' up='0,1,0'/></transform>" +
+        square_film(24) +
+        "</sensor><shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' "
+        "angle='-90'/></transform>" +
+        diffuse({0.5f, 0.6f, 0.7f}) + "</shape>";
+    for (uint32_t i = 0; i < 42; ++i) {
+        const Vec3f at = {float(i % 7) * 0.4f - 1.2f, 0.4f + 0.1f * float(i % 5), float(i / 7) * 0.4f - 1.2f};
+        s += test::lamp_of_kind(i * 5 % 7, at, at + Vec3f{0.3f, -1.0f, 0.1f * float(i % 3)}, 0.05, 1 + i % 4);
     }
     return scene_xml(3, s);
 }
@@ -140,15 +157,17 @@ TEST_CASE("A plane under bulbs and balls that a tree picks has its closed form",
 }
 
 TEST_CASE("Lights picked by a tree give the image of those picked by power", "[path][bidirectional]") {
-    for (const char* name : {"lights", "bathroom"}) {
-        const Scene scene = project_scene(name, 32, 24);
-        const uint32_t spp = 128;
+    std::vector<Scene> scenes;
+    scenes.push_back(project_scene("lights", 32, 24));
+    scenes.push_back(scene_from_text(many_kinds()));
+    for (const Scene& scene : scenes) {
+        const uint32_t spp = 192;
         const Estimate by_power =
             to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 2 * spp).film);
         for (const Method& m : kMethods) {
             const RenderResult r = render_scene(scene, tree_settings(scene, m, 12), spp);
             const ZTestResult z = z_test(to_estimate(r.film), by_power);
-            INFO(name << ", " << m.integrator << " " << m.variant << ": " << z.report());
+            INFO(scene.path << ", " << m.integrator << " " << m.variant << ": " << z.report());
             CHECK(z.pass);
             CHECK(has_tree(r.stats));
             CHECK(r.stats.invalid.total() == 0);
@@ -157,13 +176,13 @@ TEST_CASE("Lights picked by a tree give the image of those picked by power", "[p
 }
 
 TEST_CASE("In a row of rooms a tree has less variance than power", "[path][bidirectional]") {
-    const Scene scene = scene_from_text(rooms(24));
+    const Scene scene = scene_from_text(rooms(16));
     for (const Method& m : kMethods) {
         RenderSettings s = tree_settings(scene, m);
-        const FilmMoments by_tree = render_scene(scene, s, 256).film;
+        const FilmMoments by_tree = render_scene(scene, s, 128).film;
         s.light_picking = LightPicks::table;
         s.seed = 2;
-        const FilmMoments by_power = render_scene(scene, s, 256).film;
+        const FilmMoments by_power = render_scene(scene, s, 128).film;
         const double tree = relative_variance(by_tree), power = relative_variance(by_power);
         INFO(m.integrator << " " << m.variant << ", variance of a sample: " << power << " by power, " << tree);
         CHECK(tree < (std::string(m.variant) == "ris" ? 0.5 : 0.25) * power);
