@@ -28,6 +28,9 @@ uint64_t light_tree_bytes(const Scene& scene) {
            (scene.emitters.size() + uint64_t(beside)) * sizeof(uint32_t) + sizeof(LightTreeView);
 }
 
-bool light_tree_pays(const Scene& scene) { return light_leaf_count(scene) > 2; }
+bool light_tree_pays(const Scene& scene) {
+    return light_leaf_count(scene) > 2 ||
+           std::count_if(scene.emitters.begin(), scene.emitters.end(), is_in_light_tree) > 1;
+}
 
 }  // namespace ambilux

@@ -288,6 +288,9 @@ TEST_CASE("A tree is made where it has something to choose from") {
     CHECK_FALSE(light_tree_pays(project_scene("cornell")));
     CHECK_FALSE(light_tree_pays(load("<emitter type='constant'/>")));
     CHECK(light_tree_pays(project_scene("lights")));
+    const std::string bulb = lamp_of_kind(4, {0, 0, 0}, {0, 0, 0}, 0.1, 1);
+    CHECK_FALSE(light_tree_pays(load(bulb)));
+    CHECK(light_tree_pays(load(bulb + bulb)));
 }
 
 TEST_CASE("A coarse normal rounded again is the same") {
