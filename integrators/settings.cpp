@@ -130,6 +130,17 @@ std::vector<Setting> main_settings() {
     };
 }
 
+Setting light_picking() {
+    return Setting(Of::choice("light_picking", &S::light_picking, {"table", "tree"},
+                              "how next event estimation picks an emitter: by the table of the scene (option "
+                              "--light-picking), or by a tree over the lights that knows the receiver (Conty Estevez "
+                              "and Kulla 2018)"))
+        .limit("tree", has_light_tree, "its kernels pick emitters by the table alone")
+        .not_with_auto(
+            "its pilot predicts for emitters picked by the table; render with the settings that it chooses "
+            "and this one");
+}
+
 /// Strategies, their weights and their numbers.
 std::vector<Setting> estimator_settings() {
     using Is = Setting;
@@ -146,12 +157,7 @@ std::vector<Setting> estimator_settings() {
             .key_of_runs()
             .image_attribute()
             .leaves_out(),
-        Is(Of::choice("light_picking", &S::light_picking, {"table", "tree"},
-                      "how next event estimation picks an emitter: by the table of the scene (option --light-picking), "
-                      "or by a tree over the lights that knows the receiver (Conty Estevez and Kulla 2018)"))
-            .limit("tree", has_light_tree, "its kernels pick emitters by the table alone")
-            .not_with_auto("its pilot predicts for emitters picked by the table; render with the settings that it "
-                           "chooses and this one"),
+        light_picking(),
         Is(Of::choice("heuristic", &S::heuristic, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)},
                       "heuristic of multiple importance sampling"))
             .where(weighs, "nothing is weighted")

@@ -63,18 +63,7 @@ nlohmann::json instances_info(const Scene& scene) {
             {"bytes_of_copies", copies}};
 }
 
-}  // namespace
-
-nlohmann::json scene_info(const Scene& scene) {
-    std::map<std::string, uint64_t> shapes, bsdfs, emitters, textures;
-    for (const Shape& shape : scene.shapes) {
-        const bool mesh = shape.primitive_count == 0 || shape.first_primitive < scene.triangles.size();
-        ++shapes[mesh ? "mesh" : name_of(scene.quadrics[shape.first_primitive - scene.triangles.size()].type)];
-    }
-    for (const BsdfRecord& b : scene.bsdfs) ++bsdfs[name_of(b.type)];
-    for (const Emitter& e : scene.emitters) ++emitters[name_of(e.type)];
-    for (const Texture& t : scene.textures) ++textures[t.type == TextureType::bitmap ? "bitmap" : "checkerboard"];
-    const Sensor& s = scene.sensor;
+nlohmann::json sensor_info(const Sensor& s) {
     const double degrees = 360 / M_PI;
     nlohmann::json sensor = {{"type", name_of(s.type)}};
     if (!is_latlong(s.type)) {
@@ -89,6 +78,21 @@ nlohmann::json scene_info(const Scene& scene) {
         sensor["aperture_radius"] = s.aperture_radius;
         sensor["focus_distance"] = s.focus_distance;
     }
+    return sensor;
+}
+
+}  // namespace
+
+nlohmann::json scene_info(const Scene& scene) {
+    std::map<std::string, uint64_t> shapes, bsdfs, emitters, textures;
+    for (const Shape& shape : scene.shapes) {
+        const bool mesh = shape.primitive_count == 0 || shape.first_primitive < scene.triangles.size();
+        ++shapes[mesh ? "mesh" : name_of(scene.quadrics[shape.first_primitive - scene.triangles.size()].type)];
+    }
+    for (const BsdfRecord& b : scene.bsdfs) ++bsdfs[name_of(b.type)];
+    for (const Emitter& e : scene.emitters) ++emitters[name_of(e.type)];
+    for (const Texture& t : scene.textures) ++textures[t.type == TextureType::bitmap ? "bitmap" : "checkerboard"];
+    const Sensor& s = scene.sensor;
     return {
         {"scene", scene.path},
         {"content_hash", to_hex(scene.content_hash)},
@@ -108,7 +112,7 @@ nlohmann::json scene_info(const Scene& scene) {
         {"bounds",
          {{"center", {scene.bounds_center.x, scene.bounds_center.y, scene.bounds_center.z}},
           {"radius", scene.bounds_radius}}},
-        {"sensor", sensor},
+        {"sensor", sensor_info(s)},
         {"film",
          {{"width", s.film_width},
           {"height", s.film_height},
