@@ -48,7 +48,7 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {render(folder, {"--set", "estimator=best"}), "best"},
         {render(folder, {"-i", "magic"}), "magic"},
         {render(folder, {"--backend", "abacus"}), "abacus"},
-        {render(folder, {"--light-picking", "random"}), "power and uniform"},
+        {render(folder, {"--light-picking", "random"}), "power, uniform and tree"},
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "1"}, "at least 2 samples"},
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "--set", "estimator=nee"}, "estimator mis"},
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "-i", "path"}, "-i"},
