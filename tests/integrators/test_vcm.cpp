@@ -6,7 +6,7 @@
 #include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
-#include "tests/support/glowing_sphere.h"
+#include "tests/support/merging_renders.h"
 #include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
@@ -15,13 +15,6 @@ namespace {
 
 /// All that merge, with the strategies that their names leave on.
 const char* const kMerging[] = {"vcm", "bpm", "ppm", "sppm", "pm"};
-
-RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", const char* integrator = "vcm") {
-    RenderSettings s = cpu_settings(scene, Estimator::mis, 3);
-    s.integrator = integrator;
-    apply_setting(s, "merge_radius", radius);
-    return s;
-}
 
 }  // namespace
 

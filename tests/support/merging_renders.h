@@ -1,4 +1,5 @@
-// Means of images over independent renders, and a scene that has the same radiance everywhere.
+// Renders by integrators that merge: settings, means over independent renders, and a scene that has the same radiance
+// everywhere.
 #pragma once
 
 #include <cmath>
@@ -6,6 +7,15 @@
 #include "tests/support/whole_iterations.h"
 
 namespace ambilux {
+
+inline RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", const char* integrator = "vcm",
+                                   const char* variant = "wavefront") {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, 3);
+    s.integrator = integrator;
+    s.variant = variant;
+    apply_setting(s, "merge_radius", radius);
+    return s;
+}
 
 /// Over independent renders.
 struct Mean {
