@@ -45,11 +45,22 @@ AMBILUX_HD Uint4 random_bits(const RngKey& key, uint32_t block) {
                       uint32_t(key.seed >> 32));
 }
 
-/// Four uniform floats in [0,1) for `block` of the sequence.
-AMBILUX_HD Vec4f random_floats(const RngKey& key, uint32_t block) {
-    const Uint4 b = random_bits(key, block);
+AMBILUX_HD Vec4f uniform_floats(const Uint4& b) {
     return {uniform_float(b.x), uniform_float(b.y), uniform_float(b.z), uniform_float(b.w)};
 }
+
+/// Four uniform floats in [0,1) for `block` of the sequence.
+AMBILUX_HD Vec4f random_floats(const RngKey& key, uint32_t block) { return uniform_floats(random_bits(key, block)); }
+
+/// Where the numbers of a block come from. SobolPoints (core/sobol.h) has the same functions.
+struct IndependentPoints {
+    /// Number i of the n points that a sample has of one decision: they may take the blocks from `block` on.
+    AMBILUX_HD static Uint4 bits(const RngKey& key, uint32_t block, uint32_t i = 0, uint32_t = 1) {
+        return random_bits(key, block + i);
+    }
+    /// Numbers of a block for a decision that picks with x, and finds a place or a direction with y and z.
+    AMBILUX_HD static Vec4f pick_and_place(Vec4f u) { return u; }
+};
 
 /// One uniform float in [0,1) from two words; a cheap hash (Jarzynski and Olano 2020, pcg2d) for decisions that belong
 /// to a (ray, primitive) pair and must not depend on the order in which primitives are visited.

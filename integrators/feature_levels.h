@@ -55,6 +55,13 @@ constexpr Features kTreeFeatures = [] {
     return f;
 }();
 
+/// All, and numbers from Sobol' points. The same holds for it.
+constexpr Features kSobolFeatures = [] {
+    Features f = kAllFeatures;
+    f.sobol = true;
+    return f;
+}();
+
 /// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
 /// is false.
 template <class Function>

@@ -77,6 +77,7 @@ bool compacts(const VariantTraits& v, bool) { return v.compacts; }
 bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
 bool has_binary_bvh(const VariantTraits& v, bool cuda) { return v.binary_bvh && cuda; }
 bool has_light_tree(const VariantTraits& v, bool) { return v.light_tree; }
+bool has_sobol(const VariantTraits& v, bool) { return v.sobol; }
 bool has_twin(const VariantTraits& v, bool cuda) { return v.in_double && !cuda; }
 bool on_cpu(const VariantTraits&, bool cuda) { return !cuda; }
 bool on_cuda(const VariantTraits&, bool cuda) { return cuda; }
@@ -141,6 +142,17 @@ Setting light_picking() {
             "and this one");
 }
 
+Setting sampler() {
+    return Setting(Of::choice("sampler", &S::sampler, {"independent", "sobol"},
+                              "where the random numbers of subpaths come from: each by itself, or shuffled, "
+                              "Owen-scrambled Sobol' points (Burley 2020), whose error is known from several seeds "
+                              "alone"))
+        .limit("sobol", has_sobol, "its kernels have independent numbers alone")
+        .not_with_auto("its pilot predicts for independent numbers; render with the settings that it chooses and this "
+                       "one")
+        .image_attribute();
+}
+
 /// Strategies, their weights and their numbers.
 std::vector<Setting> estimator_settings() {
     using Is = Setting;
@@ -158,6 +170,7 @@ std::vector<Setting> estimator_settings() {
             .image_attribute()
             .leaves_out(),
         light_picking(),
+        sampler(),
         Is(Of::choice("heuristic", &S::heuristic, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)},
                       "heuristic of multiple importance sampling"))
             .where(weighs, "nothing is weighted")

@@ -71,12 +71,19 @@ enum class LightPicks : uint32_t {
     tree,   ///< by what lights can bring to the receiver (scene/light_tree.h)
 };
 
+/// Where the random numbers of subpaths come from.
+enum class Sampler : uint32_t {
+    independent,  ///< each by itself (core/rng.h)
+    sobol,        ///< shuffled, Owen-scrambled Sobol' points (core/sobol.h): samples of a pixel depend on each other
+};
+
 struct RenderSettings {
     std::string integrator = "path", variant = "wavefront";  ///< names of a Variant (registry.h)
     Choice<Backend> backend = Backend::automatic;
     Precision precision = Precision::single;
     Estimator estimator = Estimator::mis;
     LightPicks light_picking = LightPicks::table;
+    Sampler sampler = Sampler::independent;
     MisHeuristic heuristic = MisHeuristic::balance;
     uint32_t strategies = kAllStrategies;  ///< StrategyBits
     SingleStrategies singles;              ///< if on, these and not the groups

@@ -110,6 +110,17 @@ AMBILUX_HD uint32_t light_subpaths_of(uint32_t slot, uint32_t per_tile) {
     return ((z + 1) * per_tile + up) / kTilePixels - (z * per_tile + up) / kTilePixels;
 }
 
+/// Number, in the render, of the light subpath that begins in a slot and a round (Wave::first_key): sample by sample,
+/// in the order of slots. Tiles that lie partly off the film leave gaps.
+AMBILUX_HD uint64_t light_subpath_number(const Wave& wave, uint32_t slot, uint32_t per_tile) {
+    const uint32_t s = wave.sample_of(slot), z = slot % kTilePixels;
+    const uint32_t tile = wave.state->first_tile + slot / kTilePixels - s * wave.tiles;
+    const uint32_t film_tiles = wave.tiles_x * ((wave.height + kTileSide - 1) / kTileSide);
+    const uint32_t before = (z * per_tile + kTilePixels - 1) / kTilePixels;
+    const uint32_t round = wave.first_key / (wave.width * wave.height);
+    return (uint64_t(wave.state->first_sample + s) * film_tiles + tile) * per_tile + before + round;
+}
+
 /// Light subpaths of one sample that begin in the `tiles` tiles from `first_tile` on.
 inline uint32_t light_subpaths_in(const Wave& wave, uint32_t first_tile, uint32_t tiles, uint32_t per_tile) {
     uint32_t count = 0;

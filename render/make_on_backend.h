@@ -45,6 +45,9 @@ std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make)
     if constexpr (F.light_tree)
         if (settings.fuse == Fuse::none)
             throw Error(ExitCode::usage, "fuse=none: there are no such kernels with light_picking=tree");
+    if constexpr (F.sobol)
+        if (settings.fuse == Fuse::none)
+            throw Error(ExitCode::usage, "fuse=none: there are no such kernels with sampler=sobol");
     return make.template operator()<kFused>();
 }
 

@@ -29,6 +29,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
 CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderSettings& s) {
     Features needed = s.specialise && s.fuse != Fuse::none ? scene.features : kAllFeatures;
     needed.light_tree = s.light_picking == LightPicks::tree && light_tree_pays(scene);
+    needed.sobol = s.sampler == Sampler::sobol;
     const Variant& variant = variant_of(s);
     for (const CompiledRenderer& r : compiled_renderers()) {
         const CompiledRenderer::Make make = cuda ? r.cuda : r.cpu;
@@ -36,7 +37,9 @@ CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderS
             return make;
     }
     throw Error(ExitCode::usage, fmt::format("{}: integrators/registry.list has no level {} for it", variant.name(),
-                                             needed.light_tree ? "Tree" : "All"));
+                                             needed.sobol        ? "Sobol"
+                                             : needed.light_tree ? "Tree"
+                                                                 : "All"));
 }
 
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
@@ -53,6 +56,10 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     accels.place_textures(settings.textures);
     if (in_double && settings.light_picking == LightPicks::tree)
         throw Error(ExitCode::usage, "light_picking=tree: precision=double picks emitters by the table alone");
+    if (settings.sampler == Sampler::sobol && settings.light_picking == LightPicks::tree)
+        throw Error(ExitCode::usage, "sampler=sobol: there are no kernels with light_picking=tree as well");
+    if (in_double && settings.sampler == Sampler::sobol)
+        throw Error(ExitCode::usage, "sampler=sobol: precision=double has independent numbers alone");
     if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
         return make_automatic(scene, settings, cuda, accels,

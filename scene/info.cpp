@@ -34,6 +34,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.instances) names.push_back("instances");
     if (f.latlong) names.push_back("spherical sensor");
     if (f.light_tree) names.push_back("light tree");
+    if (f.sobol) names.push_back("Sobol' points");
     return names;
 }
 

@@ -1,6 +1,7 @@
 // generate: the first ray of each slot's subpath.
 #pragma once
 
+#include "stages/light_numbers.h"
 #include "stages/stage.h"
 #include "transport/subpath/start.h"
 
@@ -68,7 +69,7 @@ struct GenerateLight {
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (last_vertex) last_vertex[slot] = kNone;
         if (round >= light_subpaths_of(slot, per_tile) || !wave.locate(slot).active) return;
-        const NumbersOf<Mis> numbers = {wave.key(slot, Stream::light)};
+        const NumbersOf<Mis> numbers = light_numbers(rules.mis, wave, slot);
         EmissionSample e;
         Subpath<Mis> path;
         if (start_light_subpath<F>(scene, rules, numbers, LightStartSink<F, Mis, Out>{splats, slot, numbers, record}, e,

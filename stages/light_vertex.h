@@ -1,6 +1,7 @@
 // light_shade and connect_camera: vertices of light subpaths.
 #pragma once
 
+#include "stages/light_numbers.h"
 #include "stages/stage.h"
 #include "transport/subpath/camera_connection.h"
 #include "transport/subpath/visit.h"
@@ -42,7 +43,7 @@ struct ConnectCameraQueue {
         Subpath<Mis> path{};
         path.throughput = end.throughput;
         path.depth = end.depth;
-        connect.at(scene, rules, end.vertex, path, item.path, {wave.key(item.path, Stream::light)});
+        connect.at(scene, rules, end.vertex, path, item.path, light_numbers(rules.mis, wave, item.path));
     }
 };
 
@@ -76,7 +77,7 @@ struct LightVertex {
         const LightVertex& stage;
         uint32_t slot;
 
-        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot, Stream::light)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return light_numbers(stage.rules.mis, stage.wave, slot); }
         AMBILUX_HD void add(const Candidate<Mis>&) const {}
         AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& path, const NumbersOf<Mis>& numbers) const {
             const Rules<Mis>& rules = stage.rules;

@@ -44,15 +44,18 @@ struct LightVertexSource {
     }
 };
 
-/// Which of `size` light vertices a draw of the eye vertex at `depth` finds, each with the same probability. Coherent
-/// draws begin at one random place of the cache for all lanes: so does what they load, and mostly it was left by light
-/// subpaths on one material.
-AMBILUX_HD uint32_t drawn_vertex(RngKey key, uint32_t depth, uint32_t draw, uint32_t size, bool coherent) {
-    if (!coherent) return mul_hi(cache_draw(key, depth, draw).x, size);
+/// Which of `size` light vertices a draw of the eye vertex at `depth`, one of `draws`, finds, each with the same
+/// probability. Coherent draws begin at one random place of the cache for all lanes: so does what they load, and mostly
+/// it was left by light subpaths on one material.
+template <class Points = IndependentPoints>
+AMBILUX_HD uint32_t drawn_vertex(RngKey key, uint32_t depth, uint32_t draw, uint32_t size, bool coherent,
+                                 uint32_t draws = kMaxCacheDraws) {
+    if (!coherent) return mul_hi(cache_draw<Points>(key, depth, draw, draws).x, size);
     const Warp warp;
     key.index = warp.first(key.index);
     key.sample = warp.first(key.sample);
-    const uint32_t at = mul_hi(cache_draw(key, warp.first(depth), warp.first(draw)).x, size) + warp.rank();
+    const uint32_t begin = mul_hi(cache_draw<Points>(key, warp.first(depth), warp.first(draw), draws).x, size),
+                   at = begin + warp.rank();
     return at < size ? at : at % size;
 }
 
@@ -76,7 +79,9 @@ struct LightVertexSearch {
         if (size == 0 || depth + 2 > max_depth) next = kNone;
         while (next != kNone) {
             uint32_t light = next;
-            if (drawn) light = drawn_vertex(key, depth, --next, size, source.coherent);
+            if (drawn)
+                light = drawn_vertex<typename NumbersOf<Mis>::Points>(key, depth, --next, size, source.coherent,
+                                                                      source.draws);
             const ConnectionVertexFront y = source.vertices.items.load_front(light);
             if (!drawn)
                 next = y.link;

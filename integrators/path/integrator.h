@@ -7,7 +7,7 @@
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
 #include "stages/generate.h"
-#include "transport/mis/by_tree.h"
+#include "transport/mis/by_sobol.h"
 
 namespace ambilux {
 
@@ -18,7 +18,7 @@ struct NoSettings {
 
 /// `Sampling`: how eye vertices sample emitters, with `SamplingSettings` as its last member unless that is empty.
 template <Features F, class Tracer, Fusion kFusion, template <Features, class, class> class Sampling = NextEvent,
-          class SamplingSettings = NoSettings, class Model = PickingMis<F, UnidirectionalMis>>
+          class SamplingSettings = NoSettings, class Model = ModelFor<F, UnidirectionalMis>>
 struct PathIntegrator {
     using Mis = Model;
     using RayItem = typename SubpathItems<Mis>::Ray;

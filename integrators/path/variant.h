@@ -11,6 +11,7 @@ struct PathVariant {
     static constexpr VariantTraits kTraits = {.estimators = true,
                                               .binary_bvh = true,
                                               .light_tree = true,
+                                              .sobol = true,
                                               .in_double = true,
                                               .replay = ReplayPairing::none,
                                               .references = References::plain};

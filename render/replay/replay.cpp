@@ -24,6 +24,8 @@ void check_replay(const RenderSettings& settings) {
                     "`ambilux render` printed as its selection");
     if (settings.light_picking == LightPicks::tree)
         throw Error(ExitCode::usage, "light_picking=tree: a replay picks emitters by the table of the scene alone");
+    if (settings.sampler == Sampler::sobol)
+        throw Error(ExitCode::usage, "sampler=sobol: a replay has independent numbers alone");
     if (variant.traits.replay != ReplayPairing::no_replay) return;
     const auto have = [](const VariantTraits& v) { return v.replay != ReplayPairing::no_replay; };
     const std::vector<std::string> others = variants_that(have, variant.integrator);

@@ -46,20 +46,29 @@ struct Candidate {
 
 /// Random numbers of a subpath: a block of four for each decision (core/rng.h). A model of weights names the type that
 /// its integrator uses (Mis::Numbers). It holds these two fields and nothing else, so that whoever needs numbers makes
-/// it anew.
-struct RandomNumbers {
+/// it anew. `Points`: where blocks come from (core/rng.h).
+template <class PointsOfBlocks>
+struct NumbersFrom {
+    using Points = PointsOfBlocks;
+
     RngKey key;
     uint32_t number = 0;  ///< of the light subpath among those of its key: streaming starts one for every eye vertex
 
-    AMBILUX_HD Vec4f block(uint32_t b) const { return random_floats(key, b + (number << 16)); }
+    AMBILUX_HD Vec4f block(uint32_t b) const { return uniform_floats(Points::bits(key, b + (number << 16))); }
     /// Film position and lens.
     AMBILUX_HD Vec4f camera() const { return block(0); }
     /// Place on the emitter; direction, and the lens that sees the place.
-    AMBILUX_HD Vec4f emission_position() const { return block(0); }
+    AMBILUX_HD Vec4f emission_position() const { return Points::pick_and_place(block(0)); }
     AMBILUX_HD Vec4f emission_direction() const { return block(1); }
     /// At the vertex at the end of `depth` segments: direction and Russian roulette; emitter (eye); lens (light).
-    AMBILUX_HD Vec4f scatter(Side side, uint32_t depth) const { return block(2 * depth - (side == Side::eye ? 1 : 0)); }
-    AMBILUX_HD Vec4f next_event(uint32_t depth) const { return block(2 * depth); }
+    AMBILUX_HD Vec4f scatter(Side side, uint32_t depth) const {
+        return Points::pick_and_place(block(2 * depth - (side == Side::eye ? 1 : 0)));
+    }
+    AMBILUX_HD Vec4f next_event(uint32_t depth) const { return Points::pick_and_place(block(2 * depth)); }
+    /// Emitter i of n, where a vertex samples several: with blocks from `first` on, which nothing else may use.
+    AMBILUX_HD Vec4f emitter_of_several(uint32_t first, uint32_t i, uint32_t n) const {
+        return Points::pick_and_place(uniform_floats(Points::bits(key, first + (number << 16), i, n)));
+    }
     AMBILUX_HD Vec4f lens(uint32_t depth) const { return block(2 * depth + 1); }
     /// Seed of the decisions whether surfaces of partial opacity let a ray pass, another one for every ray: that of the
     /// subpath, and shadow rays, which `which` tells apart.
@@ -72,6 +81,7 @@ private:
         return hash_word({key.index, key.sample, which, word});
     }
 };
+using RandomNumbers = NumbersFrom<IndependentPoints>;
 
 template <class Mis>
 using NumbersOf = typename Mis::Numbers;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "integrators/bdpt/shared/two_sides.h"
-#include "transport/mis/by_tree.h"
+#include "transport/mis/by_sobol.h"
 
 namespace ambilux {
 
@@ -43,6 +43,6 @@ struct LvcOf {
     }
 };
 template <Features F, class Tracer, Fusion kFusion>
-using LvcIntegrator = LvcOf<F, Tracer, kFusion, PickingMis<F, BidirectionalMis>>;
+using LvcIntegrator = LvcOf<F, Tracer, kFusion, ModelFor<F, BidirectionalMis>>;
 
 }  // namespace ambilux

@@ -15,6 +15,7 @@ struct LvcVariant {
                                               .strategy_images = true,
                                               .repeats = false,
                                               .light_tree = true,
+                                              .sobol = true,
                                               .replay = ReplayPairing::cache,
                                               .references = References::as_it_is};
 

@@ -18,10 +18,10 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
 template <Features F, class Mis>
     requires(!std::is_same_v<Mis, BidirectionalMis>)
 double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed) {
-    // Light subpaths begin by power, whatever next event estimation does.
+    // Light subpaths begin by power, whatever next event estimation does; a mean needs no even points.
     constexpr Features kOwn = [] {
         Features f = F;
-        f.light_tree = false;
+        f.light_tree = f.sobol = false;
         return f;
     }();
     return mean_light_vertices<kOwn>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);

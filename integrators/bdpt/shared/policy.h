@@ -44,7 +44,10 @@ void need_one_light_subpath(const RenderSettings& settings, const char* why);
 template <class Mis>
 BdptPolicyOf<Mis> plan_bdpt(const Scene& scene, const RenderSettings& settings) {
     const BdptPolicy p = plan_bdpt(scene, settings);
-    return p.with(Mis{p.rules.mis});
+    BdptPolicyOf<Mis> own = p.with(Mis{p.rules.mis});
+    if constexpr (requires { own.rules.mis.light_subpaths_per_tile; })
+        own.rules.mis.light_subpaths_per_tile = p.waves.light_subpaths_per_tile;
+    return own;
 }
 
 /// Names of strategies that this render does without.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "integrators/bdpt/shared/two_sides.h"
-#include "transport/mis/by_tree.h"
+#include "transport/mis/by_sobol.h"
 
 namespace ambilux {
 
@@ -38,7 +38,7 @@ struct WavefrontOf {
     }
 };
 template <Features F, class Tracer, Fusion kFusion>
-using WavefrontIntegrator = WavefrontOf<F, Tracer, kFusion, PickingMis<F, BidirectionalMis>>;
+using WavefrontIntegrator = WavefrontOf<F, Tracer, kFusion, ModelFor<F, BidirectionalMis>>;
 
 /// Integrator light has the stages of its one group of strategies (plan_bdpt).
 template <Features F, class Tracer, Fusion kFusion>

@@ -13,6 +13,7 @@ struct WavefrontVariant {
                                               .light_subpaths = true,
                                               .strategy_images = true,
                                               .light_tree = true,
+                                              .sobol = true,
                                               .in_double = true,
                                               .selects_any = true,
                                               .replay = ReplayPairing::own_subpath,
@@ -29,8 +30,11 @@ struct WavefrontVariant {
 
 struct LightVariant {
     static constexpr const char* kHelp = "light tracer: vertices of light subpaths are connected with the camera";
-    static constexpr VariantTraits kTraits = {
-        .light_subpaths = true, .strategy_images = true, .in_double = true, .replay = ReplayPairing::own_subpath};
+    static constexpr VariantTraits kTraits = {.light_subpaths = true,
+                                              .strategy_images = true,
+                                              .sobol = true,
+                                              .in_double = true,
+                                              .replay = ReplayPairing::own_subpath};
 
     static uint32_t strategies(const RenderSettings&) { return kLightStrategies; }
     static std::vector<Stressed> stress() { return both_heuristics("light"); }

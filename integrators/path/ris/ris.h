@@ -55,19 +55,18 @@ private:
     /// Blocks of random numbers beyond those of RandomNumbers.
     static constexpr uint32_t kFirstBlock = 0x20000u;
 
-    AMBILUX_HD static Vec4f block(const NumbersOf<Mis>& numbers, uint32_t depth, uint32_t i) {
-        return numbers.block(kFirstBlock + depth * RisSettings::kMostCandidates + i);
-    }
     AMBILUX_HD bool resample(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v,
                              const Subpath<Mis>& path, const NumbersOf<Mis>& numbers, Candidate<Mis>& c) const {
         if (!rules.next_event) return false;
         const Receiver receiver = {v.point.p, v.point.ng};
         Reservoir reservoir{};
         reservoir.u = numbers.next_event(path.depth).x;
+        const uint32_t first_block = kFirstBlock + path.depth * RisSettings::kMostCandidates;
         for (uint32_t i = 0; i < settings.candidates; ++i) {
             LightCandidate x;
             // The target needs the radiance of environments now, not once the way is known to be free.
-            if (!sample_emitter_direct<F>(scene, rules.lights, receiver, block(numbers, path.depth, i), x.light) ||
+            const Vec4f u = numbers.emitter_of_several(first_block, i, settings.candidates);
+            if (!sample_emitter_direct<F>(scene, rules.lights, receiver, u, x.light) ||
                 !may_scatter(v.scattering, x.light.wi))
                 continue;
             x.f = rules.directions.template evaluate<F>(v, x.light.wi, TransportMode::radiance);
