@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -89,6 +90,13 @@ size_t bytes_to_save(const Scene& scene) {
     return size_t(scene.sensor.crop_width) * scene.sensor.crop_height * kPerPixel + kRest;
 }
 
+void check_aovs_of(const RenderArguments& o, const RenderSettings& settings) {
+    if (settings.sampler == Sampler::sobol && std::find(o.aovs.begin(), o.aovs.end(), "variance") != o.aovs.end())
+        throw Error(ExitCode::usage,
+                    "--aov variance: with sampler=sobol samples depend on each other, and their scatter is not the "
+                    "error of the mean; render several seeds");
+}
+
 void write_images(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
                   const RenderStats& stats, const FilmMoments& film) {
     const Image image = mean_image(film);
@@ -151,6 +159,7 @@ int render_by_ranges(const RenderArguments& o) {
     const LoadedScene loaded = load(o);
     ParallelRequest request;
     request.settings = o.render.settings(loaded.scene);
+    check_aovs_of(o, request.settings);
     request.budget = render_budget(o.spp, o.time, loaded.scene, "--");
     expect(request.settings, request.budget);
     request.devices = o.devices;
@@ -300,6 +309,7 @@ int render(const RenderArguments& o) {
     const LoadedScene loaded = load(o);
     const Scene& scene = loaded.scene;
     RenderSettings settings = o.render.settings(scene);
+    check_aovs_of(o, settings);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
     const Budget budget = render_budget(o.spp, o.time, scene, "--");
     expect(settings, budget);

@@ -156,7 +156,8 @@ bool TaskRunner::pass_checkpoints(RenderTask& task, Renderer& renderer) {
         // in the same order as an uninterrupted one.
         if (position.samples > before.samples) {
             const FilmMoments film = renderer.film();
-            if (!position.interrupted)
+            // Batches are told as independent of each other.
+            if (!position.interrupted && task.settings.sampler == Sampler::independent)
                 record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
             state.moments.add(film);
             state.devices = save_devices(renderer);

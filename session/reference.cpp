@@ -43,6 +43,10 @@ void check_same(const std::string& path, const Attributes& stored, const Referen
 }
 
 void check_settings(const RenderSettings& settings) {
+    if (settings.sampler == Sampler::sobol)
+        throw Error(ExitCode::usage,
+                    "sampler=sobol: a reference states standard errors, which samples that depend on each other do not "
+                    "tell; leave the setting out");
     const auto& all = general_settings();
     const bool partial =
         std::any_of(all.begin(), all.end(), [&](const Setting& s) { return s.partial && !s.is_default(settings); });

@@ -97,6 +97,12 @@ static std::string light_picking_text(const Scene& scene, const RenderSettings& 
     return scene.light_picking == "tree" ? "power" : scene.light_picking;
 }
 
+/// What tells the error of a mean: the scatter of samples, or renders of several seeds alone, where samples of a render
+/// depend on each other.
+static const char* errors_from(const RenderSettings& used) {
+    return used.sampler == Sampler::sobol ? "seeds" : "samples";
+}
+
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const RenderStats& stats,
                           double load_seconds) {
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
@@ -118,6 +124,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
         {{"asked", settings_json(asked)},
          {"method", method_text(used)},
          {"bias", bias_text(used)},
+         {"errors_from", errors_from(used)},
          {"scene", scene.path},
          {"scene_hash", scene_hash(scene)},
          {"warnings", scene.warnings},
@@ -160,6 +167,7 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
                              {"git_revision", git_revision()}};
     const RenderSettings settings = used_settings(asked, stats);
     attributes["method"] = method_text(settings);
+    attributes["errors_from"] = errors_from(settings);
     if (const std::string bias = bias_text(settings); !bias.empty()) attributes["bias"] = bias;
     attributes["settings"] = settings_json(settings).dump();
     std::string kernels;

@@ -121,6 +121,7 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
         RenderSettings settings = render.settings;
         settings.integrator = RenderSettings().integrator;
         settings.variant = RenderSettings().variant;
+        settings.sampler = Sampler::independent;
         settings.seed = kAgreementSeed;
         compare_with_own(agreement, *make_renderer(render.scene.scene, settings), request_.interrupt);
     }

@@ -109,7 +109,12 @@ public:
     }
     void clear() { renderer_->clear_film(); }
 
-    Reference pixels() { return to_reference(renderer_->film()); }
+    /// Without standard errors where samples depend on each other.
+    Reference pixels() {
+        Reference pixels = to_reference(renderer_->film());
+        if (renderer_->stats().settings.sampler == Sampler::sobol) pixels.standard_error = {};
+        return pixels;
+    }
     std::optional<DeviceImage> device_image() {
         std::optional<DeviceImage> image;
         run_unlocked([&](const volatile bool*) { image = renderer_->device_image(); });
