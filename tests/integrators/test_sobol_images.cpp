@@ -128,8 +128,8 @@ TEST_CASE("By Sobol' points a plane under lamps has its closed form", "[path][bi
 
 TEST_CASE("Sobol' points give the means of independent numbers", "[path][bidirectional]") {
     const Scene scene = project_scene("cornell", 16, 16);
-    const Estimate independent = to_estimate(images(scene, settings_of(scene, kPath, Sampler::independent), 16, 192));
-    for (const Method& m : {kPath, kCache}) check_means(scene, m, 64, independent, 1.5e-2);
+    const Estimate independent = to_estimate(images(scene, settings_of(scene, kPairs, Sampler::independent), 16, 192));
+    for (const Method& m : {kPairs, kCache}) check_means(scene, m, 64, independent, 1.5e-2);
 }
 
 TEST_CASE("Variance over seeds is less by Sobol' points", "[path][bidirectional]") {
