@@ -148,8 +148,9 @@ Setting sampler() {
                               "Owen-scrambled Sobol' points (Burley 2020), whose error is known from several seeds "
                               "alone"))
         .limit("sobol", has_sobol, "its kernels have independent numbers alone")
-        .not_with_auto("its pilot predicts for independent numbers; render with the settings that it chooses and this "
-                       "one")
+        .not_with_auto(
+            "its pilot predicts for independent numbers; render with the settings that it chooses and this "
+            "one")
         .image_attribute();
 }
 
