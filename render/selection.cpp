@@ -21,12 +21,11 @@
 namespace ambilux {
 namespace {
 
-/// Pilots: a few hundredths of the shortest renders that are worth a selection, on 2 cores and on the 16 beside a GPU.
-/// With half of the latter, one seed in ten (water-caustic) or two (veach-ajar) put a candidate first that is 1.1
-/// to 1.5 times worse.
-constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
+/// What every candidate has beside the variance that a pilot sees, in multiples of the median candidate's: fitted to the
+/// project's own scenes (docs/lab/2026-11-28-regret.md).
+constexpr double kUnseen = 0.2;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
@@ -62,6 +61,21 @@ SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, fl
     }
     c.offer = std::move(offer);
     return c;
+}
+
+/// Eye subpaths of a pilot: a few hundredths of the time of a render that ends by the clock, on 2 cores and on the 16
+/// beside a GPU. With half of the most for a device, one seed in ten (water-caustic) or two (veach-ajar) put a candidate
+/// first that is 1.1 to 1.5 times worse.
+uint32_t pilot_samples(const RenderSettings& settings, bool cuda) {
+    const double most = cuda ? 32768 : 8192, for_seconds = cuda ? 2 : 4, least = 4096;
+    if (settings.expected_samples > 0 || !(settings.expected_seconds > 0)) return uint32_t(most);
+    return uint32_t(std::clamp(most * settings.expected_seconds / for_seconds, least, most));
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
 }
 
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
@@ -180,22 +194,29 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     return bidirectional * work;
 }
 
-std::vector<double> selection_variances(const Pilot& pilot) {
-    const size_t blocks = pilot.variance[0].size();
+std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance) {
+    const size_t blocks = variance[0].size();
     std::vector<std::pair<double, size_t>> worst(blocks);
     for (size_t b = 0; b < blocks; ++b) {
         worst[b] = {kInfinity, b};
-        for (const std::vector<double>& of : pilot.variance) worst[b].first = std::min(worst[b].first, of[b]);
+        for (const std::vector<double>& of : variance) worst[b].first = std::min(worst[b].first, of[b]);
     }
     std::sort(worst.begin(), worst.end());
     const size_t kept = blocks - size_t(kTrimmedBlocks * double(blocks));
-    std::vector<double> variances;
-    for (size_t c = 0; c < pilot.variance.size(); ++c) {
+    std::vector<double> means;
+    for (const std::vector<double>& of : variance) {
         double sum = 0;
-        for (size_t i = 0; i < kept; ++i) sum += pilot.variance[c][worst[i].second];
-        variances.push_back(std::max(sum / double(kept), 1e-12));
+        for (size_t i = 0; i < kept; ++i) sum += of[worst[i].second];
+        means.push_back(std::max(sum / double(kept), 1e-12));
     }
-    return variances;
+    return means;
+}
+
+std::vector<double> selection_variances(const Pilot& pilot) {
+    std::vector<double> means = trimmed_means(pilot.variance);
+    const double unseen = kUnseen * median(means);
+    for (double& mean : means) mean += unseen;
+    return means;
 }
 
 namespace {
@@ -224,7 +245,7 @@ public:
         for (const SelectionCandidate& c : candidates_)
             if (!c.offer.measured) predicted.push_back(c.pilot);
         const Pilot pilot =
-            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
+            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, pilot_samples(settings_, cuda_));
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
         variance_.resize(candidates_.size(), double(kInfinity));

@@ -321,24 +321,32 @@ TEST_CASE("the work of a candidate is that of its subpaths, shadow rays and conn
 }
 
 TEST_CASE("a hundredth of the blocks, where the best of all candidates is worst, counts for none") {
-    Pilot pilot;
-    pilot.variance = {std::vector<double>(200, 2), std::vector<double>(200, 3)};
+    std::vector<std::vector<double>> variance = {std::vector<double>(200, 2), std::vector<double>(200, 3)};
     const auto set = [&](size_t block, double a, double b) {
-        pilot.variance[0][block] = a;
-        pilot.variance[1][block] = b;
+        variance[0][block] = a;
+        variance[1][block] = b;
     };
     set(7, 1000, 500);
     set(8, 1000, 1);
     set(9, 400, 600);
     set(10, 300, 301);
-    const std::vector<double> kept = selection_variances(pilot);
+    const std::vector<double> kept = trimmed_means(variance);
     REQUIRE(kept.size() == 2);
     CHECK(kept[0] == Approx((196 * 2 + 1000 + 300) / 198.0));
     CHECK(kept[1] == Approx((196 * 3 + 1 + 301) / 198.0));
-    for (std::vector<double>& of : pilot.variance) of.resize(99);
-    CHECK(selection_variances(pilot)[1] == Approx((95 * 3 + 500 + 1 + 600 + 301) / 99.0));
-    pilot.variance = {{0, 0}, {1, 0}};
-    CHECK(selection_variances(pilot) == std::vector<double>{1e-12, 0.5});
+    for (std::vector<double>& of : variance) of.resize(99);
+    CHECK(trimmed_means(variance)[1] == Approx((95 * 3 + 500 + 1 + 600 + 301) / 99.0));
+    CHECK(trimmed_means({{0, 0}, {1, 0}}) == std::vector<double>{1e-12, 0.5});
+}
+
+TEST_CASE("what no pilot sees counts for all candidates alike: a fifth of the median") {
+    Pilot pilot;
+    pilot.variance = {{10}, {1}, {4}};
+    const std::vector<double> all = selection_variances(pilot);
+    REQUIRE(all.size() == 3);
+    CHECK(all[0] == Approx(10.8));
+    CHECK(all[1] == Approx(1.8));
+    CHECK(all[2] == Approx(4.8));
 }
 
 TEST_CASE("a candidate that cannot find some of the light is never chosen") {
