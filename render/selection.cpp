@@ -23,8 +23,8 @@ namespace {
 
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
-/// What every candidate has beside the variance that a pilot sees, in multiples of the median candidate's: fitted to the
-/// project's own scenes (docs/lab/2026-11-28-regret.md).
+/// What every candidate has beside the variance that a pilot sees, in multiples of the median candidate's: fitted to
+/// the project's own scenes (docs/lab/2026-11-28-regret.md).
 constexpr double kUnseen = 0.2;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
@@ -64,8 +64,8 @@ SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, fl
 }
 
 /// Eye subpaths of a pilot: a few hundredths of the time of a render that ends by the clock, on 2 cores and on the 16
-/// beside a GPU. With half of the most for a device, one seed in ten (water-caustic) or two (veach-ajar) put a candidate
-/// first that is 1.1 to 1.5 times worse.
+/// beside a GPU. With half of the most for a device, one seed in ten (water-caustic) or two (veach-ajar) put a
+/// candidate first that is 1.1 to 1.5 times worse.
 uint32_t pilot_samples(const RenderSettings& settings, bool cuda) {
     const double most = cuda ? 32768 : 8192, for_seconds = cuda ? 2 : 4, least = 4096;
     if (settings.expected_samples > 0 || !(settings.expected_seconds > 0)) return uint32_t(most);

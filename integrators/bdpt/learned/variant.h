@@ -28,7 +28,8 @@ struct LearnedVariant {
         if (r.light_paths == 0.0f || !offered || !r.may_draw() || images) return {};
         const uint32_t worth = r.cuda ? 16 : 12;
         const double work = r.cuda ? 1.75 : 1.25;
-        return {{", learned, 4 connections", {{"strategies", "all"}, {"connections", "4"}}, true, 4, worth, work, 1 << 18}};
+        return {
+            {", learned, 4 connections", {{"strategies", "all"}, {"connections", "4"}}, true, 4, worth, work, 1 << 18}};
     }
     /// Random scenes compare it with the others instead (docs/validation.md).
     static std::vector<Stressed> stress() { return {}; }
