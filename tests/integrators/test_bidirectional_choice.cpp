@@ -1,5 +1,5 @@
 // libs: ambilux_session ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
-// data: tagged
+// long: tagged
 // timeout: 900
 // seconds: 71
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
@@ -211,7 +211,7 @@ TEST_CASE("the error is predicted for the samples that the render will take") {
 
 TEST_CASE(
     "speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them",
-    "[data]") {
+    "[data][long]") {
     const std::optional<Scene> scene = published_scene("veach-mis", 160, 90);
     if (!scene) return;
     for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -229,7 +229,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("behind a door ajar draws learn, if the render is long enough for it and not on a device", "[data]") {
+TEST_CASE("behind a door ajar draws learn, if the render is long enough for it", "[data][long]") {
     const std::optional<Scene> scene = published_scene("veach-ajar", 160, 90);
     if (!scene) return;
     for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -246,7 +246,7 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
                              [](const SelectionCandidate& c) { return c.offer.least_subpaths > 0; });
     };
     CHECK(learning(false) == 3);
-    CHECK(learning(true) == 0);
+    CHECK(learning(true) == 3);
     s.technique_depth = 4;
     CHECK(learning(false) == 0);
     const Scene small = *published_scene("veach-ajar", 32, 18);
@@ -309,15 +309,18 @@ TEST_CASE("the work of a candidate is that of its subpaths, shadow rays and conn
         CHECK(work("streaming", 1, paired) == Approx(all * (eye + light + pairs)));
         w.vertices = 4;
     }
-    // Four draws that learn take a quarter more than four that do not, and are worth twelve.
-    const std::vector<SelectionCandidate> all = selection_candidates(automatic_settings({}), false);
-    const auto named = [&](const std::string& name) {
-        return *std::find_if(all.begin(), all.end(), [&](const SelectionCandidate& c) { return c.name == name; });
-    };
-    const SelectionCandidate learned = named("bdpt, learned, 4 connections"), lvc = named("bdpt, lvc, 4 connections");
-    CHECK(selection_work(w, learned, false) == Approx(1.25 * selection_work(w, lvc, false)));
-    CHECK(learned.pilot.draws == 12);
-    CHECK(lvc.pilot.draws == 4);
+    // Four draws that learn take more than four that do not, and are worth more.
+    for (const auto& [cuda, more, worth] : {std::tuple{false, 1.25, 12u}, {true, 1.75, 16u}}) {
+        const std::vector<SelectionCandidate> all = selection_candidates(automatic_settings({}), cuda);
+        const auto named = [&](const std::string& name) {
+            return *std::find_if(all.begin(), all.end(), [&](const SelectionCandidate& c) { return c.name == name; });
+        };
+        const SelectionCandidate learned = named("bdpt, learned, 4 connections"),
+                                 lvc = named("bdpt, lvc, 4 connections");
+        CHECK(selection_work(w, learned, cuda) == Approx(more * selection_work(w, lvc, cuda)));
+        CHECK(learned.pilot.draws == worth);
+        CHECK(lvc.pilot.draws == 4);
+    }
 }
 
 TEST_CASE("a hundredth of the blocks, where the best of all candidates is worst, counts for none") {
