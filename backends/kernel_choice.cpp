@@ -50,6 +50,7 @@ std::string kernels_text(const KernelChoice& kernels) {
 }
 
 std::string built_text(const BuiltFor& built) {
+    if (built.machine_code.empty() && built.ptx.empty()) return "none";
     return "machine code of " + list_text(built.machine_code) + " and PTX of " + list_text(built.ptx);
 }
 

@@ -62,7 +62,9 @@ int run_program(int argc, const char* const* argv) {
     install_interrupt_handler();
     CLI::App app{"Ambilux: a testbed for bidirectional light transport", "ambilux"};
     app.set_version_flag("--version", [] {
-        return fmt::format("ambilux {} ({})\n{}", version(), git_revision(), devices_text(cuda_report()));
+        std::string devices = devices_text(cuda_report());
+        devices.pop_back();  // it ends a line, and so does what prints this
+        return fmt::format("ambilux {} ({})\n{}", version(), git_revision(), devices);
     });
     app.require_subcommand(1);
     app.fallthrough();

@@ -48,27 +48,32 @@ CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderS
                                                                  : "All"));
 }
 
-/// What a first start waits for. Only the kernels of this variant and level are loaded, and so compiled.
-void announce_kernels(const RenderSettings& s) {
+/// What a first start waits for, once for each variant. Only the kernels of this variant and level are loaded, and so
+/// compiled. True if there is something to wait for.
+bool announce_kernels(const RenderSettings& s) {
     const KernelChoice kernels = cuda_kernels();
     static std::set<std::string> announced;
     static std::mutex mutex;
     const std::lock_guard lock(mutex);
     const std::string name = variant_of(s).name();
-    if (kernels.kind != KernelKind::ptx || !announced.insert(name).second) return;
+    if (kernels.kind != KernelKind::ptx || !announced.insert(name).second) return false;
     const char *disabled = std::getenv("CUDA_CACHE_DISABLE"), *path = std::getenv("CUDA_CACHE_PATH");
     const std::string kept = disabled && std::string(disabled) == "1"
                                  ? "and again at every start, since CUDA_CACHE_DISABLE is set"
                                  : fmt::format("once: it keeps them in {}", path ? path : "~/.nv/ComputeCache");
     log_info(fmt::format("{}: the driver compiles kernels for this device from {}. That takes up to a minute, {}", name,
                          kernels_text(kernels), kept));
+    return true;
 }
 
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
     if (cuda && !cuda_device_present()) throw Error(ExitCode::device, why_no_cuda_device());
     const auto make = compiled_for(cuda, scene, s);
-    if (cuda) announce_kernels(s);
-    return make(scene, s, accels);
+    const bool waits = cuda && announce_kernels(s);
+    std::unique_ptr<Renderer> renderer = make(scene, s, accels);
+    if (const double seconds = waits ? renderer->stats().kernel_seconds : 0; seconds > 0)
+        log_info(fmt::format("{}: its kernels were there after {:.1f} s", variant_of(s).name(), seconds));
+    return renderer;
 }
 
 std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {

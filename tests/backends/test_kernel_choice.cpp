@@ -12,7 +12,8 @@ TEST_CASE("a list of architectures is read as CMake reads it") {
     CHECK(built_for("90").machine_code == std::vector<int>{90});
     CHECK(built_for("90").ptx == std::vector<int>{90});
     CHECK(built_for("90a-real").machine_code == std::vector<int>{90});
-    CHECK(built_text(built_for("all-major,")) == "machine code of none and PTX of none");
+    CHECK(built_text(built_for("90-real")) == "machine code of 9.0 and PTX of none");
+    CHECK(built_text(built_for("all-major,")) == "none");
 }
 
 TEST_CASE("a device gets the newest machine code of its major number, and PTX where there is none") {
