@@ -3,19 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
-#include <thread>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "backends/cuda_device.h"
 #include "core/error.h"
-#include "core/flag.h"
+#include "core/seconds.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
 #include "render/chosen.h"
+#include "render/head_start.h"
 #include "render/measured.h"
 
 namespace ambilux {
@@ -30,9 +29,6 @@ constexpr double kUnseen = 0.2;
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::string joined(const SettingTexts& settings) {
     std::string text;
@@ -110,55 +106,6 @@ double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeR
     if (count == 1 && once >= kLongEnough) return once;
     return seconds_of(kFirstTimedSample + 1, count) / count;
 }
-
-/// The path tracer of a device, which has nothing else to do while the host runs the pilot. Its samples are those that
-/// the render begins with if it is chosen: the pilot, on which that depends, has random numbers of its own. Otherwise
-/// they are dropped. For renders that end by the clock: others gain nothing.
-class HeadStart {
-public:
-    HeadStart(const RenderSettings& settings, const MakeRenderer& make)
-        : thread_([this, settings, &make] {
-              try {
-                  const auto start = Clock::now();
-                  renderer_ = make(settings);
-                  build_seconds_ = seconds_since(start);
-                  run();
-              } catch (const std::exception&) {
-                  samples_ = 0;
-                  renderer_.reset();  // it is tried again, and complains, if it is chosen
-              }
-          }) {}
-    ~HeadStart() { stop(); }
-
-    void stop() {
-        set_flag(&stop_);
-        if (thread_.joinable()) thread_.join();
-    }
-    uint32_t samples() const { return samples_; }
-    double build_seconds() const { return build_seconds_; }
-    /// Of every pixel, while there was nothing else to do; 0: unknown.
-    double seconds_per_sample() const { return seconds_per_sample_; }
-    std::unique_ptr<Renderer> take() { return std::move(renderer_); }
-
-private:
-    void run() {
-        constexpr double kBatchSeconds = 0.008;  // which the host may have to wait for
-        for (uint32_t batch = 1; samples_ == 0 || !is_set(&stop_);) {
-            const auto start = Clock::now();
-            samples_ += renderer_->render(samples_, batch);
-            const double seconds = seconds_since(start);
-            if (seconds > 0.5 * kBatchSeconds && samples_ > batch)
-                seconds_per_sample_ = seconds / batch;  // the first bears what later ones do not
-            batch = std::clamp(uint32_t(kBatchSeconds / seconds * batch), 1u, 4 * batch);
-        }
-    }
-
-    volatile bool stop_ = false;
-    uint32_t samples_ = 0;
-    double build_seconds_ = 0, seconds_per_sample_ = 0;
-    std::unique_ptr<Renderer> renderer_;
-    std::thread thread_;
-};
 
 }  // namespace
 
