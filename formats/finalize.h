@@ -8,7 +8,8 @@ namespace ambilux {
 
 /// Fills in what follows from the rest once shapes, materials, textures, emitters and sensor are set: shape areas and
 /// their cdfs, pick probabilities, environment densities, filter table, bounds, features. Call it once after the arrays
-/// are complete.
-void finalize_scene(Scene& scene, LightPicking light_picking);
+/// are complete. What follows from the same as in `before`, a finished scene that shares arrays with this one, is taken
+/// from there.
+void finalize_scene(Scene& scene, LightPicking light_picking, const Scene* before = nullptr);
 
 }  // namespace ambilux

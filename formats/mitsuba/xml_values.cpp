@@ -40,7 +40,7 @@ Vec3d any_up(Vec3d d) {
 
 Where where(const XmlSource& source, ptrdiff_t offset) {
     const auto it = std::lower_bound(source.line_ends.begin(), source.line_ends.end(), offset);
-    return {source.path, int(it - source.line_ends.begin()) + 1};
+    return {source.path, source.has_lines ? int(it - source.line_ends.begin()) + 1 : 0};
 }
 Where where(const XmlSource& source, const pugi::xml_node& node) { return where(source, node.offset_debug()); }
 
@@ -196,7 +196,7 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
     if (node.attribute("filename")) {
         const std::string path = document_.resolve(attribute(source, node, "filename"), at);
         const std::string bytes = read_input(path, document_.limits);
-        document_.files.push_back({path, bytes});
+        document_.files.push_back({path, std::make_shared<const std::string>(bytes)});
         const std::string plain = plain_text(path, bytes);
         TextCursor cursor(plain);
         for (; !cursor.done(); cursor.next_line()) {
