@@ -8,11 +8,11 @@
 namespace ambilux {
 
 bool same_structure(const Scene& a, const Scene& b) {
-    if (!same_array(a.vertices, b.vertices) || !same_array(a.triangles, b.triangles)) return false;
-    if (!same_array(a.quadrics, b.quadrics) || !same_array(a.instances, b.instances)) return false;
+    if (!same_geometry(a, b)) return false;
     if (a.features.bumps != b.features.bumps || a.features.opacity != b.features.opacity) return false;
     for (size_t i = 0; i < a.shapes.size(); ++i)
-        if (a.materials[a.shapes[i].material].lets_pass() != b.materials[b.shapes[i].material].lets_pass()) return false;
+        if (a.materials[a.shapes[i].material].lets_pass() != b.materials[b.shapes[i].material].lets_pass())
+            return false;
     return true;
 }
 

@@ -38,6 +38,7 @@ struct SceneOptions {
     std::string path, size;
     bool lenient = false;
     std::vector<std::string> parameters;  ///< NAME=VALUE
+    std::vector<std::string> edits;       ///< the same, of parameters by name (formats/edits.h)
     std::string light_picking = "power";
     std::vector<std::string> limits;  ///< KEY=VALUE
 

@@ -77,4 +77,12 @@ std::string nearly(const Names& known, const std::string& name) {
     return near.empty() ? "" : ": '" + near + "' is known";
 }
 
+std::string meant(const Names& known, const std::string& name) {
+    const std::string near = nearest_name(known, name);
+    if (!near.empty()) return ": is '" + near + "' meant?";
+    std::string all;
+    for (const std::string& k : known) all += (all.empty() ? "; known are: " : ", ") + k;
+    return all;
+}
+
 }  // namespace ambilux

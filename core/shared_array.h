@@ -19,7 +19,8 @@ class SharedArray {
 
 public:
     SharedArray() = default;
-    SharedArray(std::vector<T> values) : size_(values.size()), all_(std::make_shared<std::vector<T>>(std::move(values))) {}
+    SharedArray(std::vector<T> values)
+        : size_(values.size()), all_(std::make_shared<std::vector<T>>(std::move(values))) {}
     SharedArray(std::initializer_list<T> values) : SharedArray(std::vector<T>(values)) {}
     template <class Iterator>
     SharedArray(Iterator first, Iterator last) : SharedArray(std::vector<T>(first, last)) {}

@@ -8,16 +8,17 @@
 
 namespace ambilux {
 
-/// Changes the document. `kept` is of the scene that was built from it, or null. Throws Error(bad_input) that begins with the
-/// name of the edit.
+/// Changes the document. `kept` is of the scene that was built from it, or null. Throws Error(bad_input) that begins
+/// with the name of the edit.
 void apply_edits(document::Document& document, const std::vector<Edit>& edits, const document::Kept* kept);
 
 /// The scene that options.edits make of another one. It shares with that one what has not changed; options.editable, if
 /// there is one, gets what it was made of. `path` is for messages. Throws Error(bad_input), of edits by their names.
 Scene edited_scene(const std::string& path, const Editable& from, const LoadOptions& options);
 
-/// All that can be changed, as an array of {name, object, tag, kind, value, given}: numbers, texts and transforms as they
-/// are, `given` false where the file says nothing and a default holds; of kinds mesh and image the name of the object.
+/// All that can be changed, as an array of {name, object, tag, kind, value, given}: numbers, texts and transforms as
+/// they are, `given` false where the file says nothing and a default holds; of kinds mesh and image the name of the
+/// object.
 nlohmann::json scene_parameters(const Editable& from);
 
 /// The mesh or image of an object, or of an array, by name, as its file or array has it. Throws Error(bad_input).

@@ -36,15 +36,10 @@ double quadric_area(const Quadric& q) {
     }
 }
 
-/// Whether shapes of the one are where they are in the other.
-bool same_geometry(const Scene& a, const Scene& b) {
-    return same_array(a.vertices, b.vertices) && same_array(a.triangles, b.triangles) &&
-           same_array(a.quadrics, b.quadrics) && same_array(a.instances, b.instances);
-}
-
 void fill_areas(Scene& scene, const Scene* before) {
     const bool same = before && same_geometry(scene, *before);  // whose shapes have their areas
-    if (!same) for (Shape& shape : scene.shapes) {
+    for (Shape& shape : scene.shapes) {
+        if (same) break;
         double area = 0;
         for (uint32_t i = 0; i < shape.primitive_count; ++i) {
             const uint32_t prim = shape.first_primitive + i;
@@ -105,7 +100,9 @@ void append_environment(Scene& scene, Emitter& emitter, size_t height, const flo
 /// Bytes of a bitmap.
 size_t texel_bytes(const Texture& t) {
     return size_t(t.width) * t.height *
-           (t.format == TexelFormat::rgba8 ? 4 : t.format == TexelFormat::rgba16f ? 8 : 16);
+           (t.format == TexelFormat::rgba8     ? 4
+            : t.format == TexelFormat::rgba16f ? 8
+                                               : 16);
 }
 
 /// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get
@@ -305,7 +302,15 @@ void fill_filter_table(Scene& scene, const Scene* before) {
     scene.tables.append(table.data(), table.size());
 }
 
-void fill_sort_keys(Scene& scene) {
+Vec3f camera_position(const Scene& scene) { return column(scene.sensor.to_world, 3); }
+
+void fill_sort_keys(Scene& scene, const Scene* before) {
+    const auto has_material = [](const Shape& a, const Shape& b) { return a.material == b.material; };
+    if (before && same_geometry(scene, *before) &&
+        std::equal(scene.shapes.begin(), scene.shapes.end(), before->shapes.begin(), has_material)) {
+        scene.sort_keys = before->sort_keys;
+        return;
+    }
     const SceneView view = scene.view();
     scene.sort_keys.resize(view.primitive_count());
     for (uint32_t prim = 0; prim < view.primitive_count(); ++prim)
@@ -355,11 +360,14 @@ void fill_features(Scene& scene) {
 
 void finalize_scene(Scene& scene, LightPicking light_picking, const Scene* before) {
     fill_areas(scene, before);
-    fill_bounds(scene);
+    if (before && same_geometry(scene, *before) && camera_position(scene) == camera_position(*before))
+        scene.bounds_center = before->bounds_center, scene.bounds_radius = before->bounds_radius;
+    else
+        fill_bounds(scene);
     fill_emitters(scene, light_picking, before);
     fill_filter_table(scene, before);
     fill_features(scene);
-    fill_sort_keys(scene);
+    fill_sort_keys(scene, before);
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
     // What rays read here and there.
     const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };

@@ -33,7 +33,8 @@ struct Editable {
 };
 
 /// A change of a scene by name, such as lamp.radiance (docs/python.md): to a text as an attribute of a scene file holds
-/// it ("0.2", "1 0 0"), to an element of Mitsuba's XML, or to an array. Nothing: what holds where the file says nothing.
+/// it ("0.2", "1 0 0"), to an element of Mitsuba's XML, or to an array. Nothing: what holds where the file says
+/// nothing.
 struct Edit {
     std::string name, text;
     std::shared_ptr<const Mesh> mesh;

@@ -62,4 +62,7 @@ struct Scene {
     uint64_t memory_bytes() const;
 };
 
+/// Whether both have the same shapes in the same memory.
+bool same_geometry(const Scene& a, const Scene& b);
+
 }  // namespace ambilux

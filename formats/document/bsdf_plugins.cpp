@@ -110,8 +110,7 @@ void precompute_rough_plastic(Builder& builder, Textured<RoughPlastic>& p) {
     if (added) {
         const auto* before = builder.before ? &builder.before->reflectance_pool : nullptr;
         const bool same = before && before->contains(key);
-        known->second =
-            same ? before->at(key) : rough_internal_reflectance(p.distribution, p.alpha.value, p.ior);
+        known->second = same ? before->at(key) : rough_internal_reflectance(p.distribution, p.alpha.value, p.ior);
     }
     p.fdr_internal = known->second;
 }

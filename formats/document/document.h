@@ -77,10 +77,10 @@ struct Document {
     std::vector<std::unique_ptr<Object>> storage;
     Object* scene = nullptr;
     std::map<std::string, const Object*> ids;
-    std::vector<std::string> search_folders;                 ///< of <path>, in order
+    std::vector<std::string> search_folders;  ///< of <path>, in order
     /// Path and text of the scene files read.
     std::vector<std::pair<std::string, std::shared_ptr<const std::string>>> files;
-    std::map<std::string, Where> included_from;              ///< of those that others include: by which
+    std::map<std::string, Where> included_from;  ///< of those that others include: by which
     Limits limits;
 
     // What front ends of other formats hand over (formats/pbrt, formats/gltf).
@@ -155,8 +155,8 @@ void set_transform(Object& object, const std::string& name, const Matrix& value)
 
 struct Kept;
 
-/// The finished scene. `path` is for messages. With LoadOptions::editable, what is the same in its `kept` is taken over,
-/// and that of this scene is left there.
+/// The finished scene. `path` is for messages. With LoadOptions::editable, what is the same in its `kept` is taken
+/// over, and that of this scene is left there.
 Scene load_document(const std::string& path, const std::shared_ptr<const Document>& document,
                     const LoadOptions& options);
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/document/document.h"
+#include "scene/primitive_bounds.h"
 
 namespace ambilux::document {
 
@@ -28,27 +29,29 @@ struct LoadedImage {
     std::vector<std::string> notes;
 
     uint64_t bytes() const {
-        return uint64_t(width) * height *
-               (format == TexelFormat::rgba8 ? 4 : format == TexelFormat::rgba16f ? 8 : 16);
+        return uint64_t(width) * height * (format == TexelFormat::rgba8 ? 4 : format == TexelFormat::rgba16f ? 8 : 16);
     }
 };
 
 /// What triangles and analytic shapes were made of. Materials and emitters are no part of it.
 struct KeptGeometry {
-    std::vector<std::string> keys;  ///< of the shapes of the document: all that their primitives depend on; none: unknown
+    std::vector<std::string>
+        keys;  ///< of the shapes of the document: all that their primitives depend on; none: unknown
     std::vector<uint32_t> of_shape;  ///< for each Scene::shapes: whose copy it is
     std::vector<std::pair<std::string, Sha256Digest>> digests;
     std::vector<std::string> warnings, notes;
     uint64_t memory = 0;
+    Bounds3f surfaces;
 };
 
 struct Kept {
-    Scene scene;  ///< finished; shares its arrays
-    std::map<std::string, LoadedImage> images;        ///< Builder::images
-    std::map<std::string, uint32_t> table_pool;       ///< Builder::table_pool
-    std::map<std::string, float> reflectance_pool;    ///< Builder::rough_reflectance_pool
+    Scene scene;                                    ///< finished; shares its arrays
+    std::map<std::string, LoadedImage> images;      ///< Builder::images
+    std::map<std::string, uint32_t> table_pool;     ///< Builder::table_pool
+    std::map<std::string, float> reflectance_pool;  ///< Builder::rough_reflectance_pool
     KeptGeometry geometry;
-    std::map<const Object*, std::vector<Value>> asked;  ///< what readers asked for, with what held where nothing is said
+    std::map<const Object*, std::vector<Value>>
+        asked;  ///< what readers asked for, with what held where nothing is said
 };
 
 }  // namespace ambilux::document

@@ -132,9 +132,13 @@ Scene place_scene(const std::string& path, const Document& document, const LoadO
     std::optional<Error> outside;
     Scene scene = build_scene(path, document, options, {}, &outside, before, kept);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
-    if (const Vec3d c = far_center(scene); c.x != 0 || c.y != 0 || c.z != 0) {
+    const Bounds3f surfaces =
+        before && same_geometry(scene, before->scene) ? before->geometry.surfaces : surface_bounds(scene);
+    if (kept) kept->geometry.surfaces = surfaces;
+    if (const Vec3d c = far_center(scene, surfaces); c.x != 0 || c.y != 0 || c.z != 0) {
         if (kept) kept->asked.clear();
         scene = build_scene(path, document, options, c, nullptr, before, kept);
+        if (kept) kept->geometry.surfaces = surface_bounds(scene);
     } else if (outside) {
         throw Error(*outside);
     }

@@ -86,7 +86,8 @@ Mesh mesh_of(const Editable& from, const std::string& name) {
     const Document& document = *from.document;
     if (const Mesh* mesh = document.mesh(name)) return *mesh;
     const Object& object = object_named(document, name);
-    if (!has_mesh(object)) throw input_error(name, 0, "a shape of type '" + object.type + "' has no arrays of vertices");
+    if (!has_mesh(object))
+        throw input_error(name, 0, "a shape of type '" + object.type + "' has no arrays of vertices");
     const std::string given = text_of(object, object.type == "mesh" ? "name" : "mesh");
     if (const Mesh* mesh = given.empty() ? nullptr : document.mesh(given)) return *mesh;
     const std::string path = document.resolve(text_of(object, "filename"), object.where);
@@ -102,7 +103,8 @@ Texels image_of(const Editable& from, const std::string& name) {
     const Document& document = *from.document;
     if (const Texels* image = document.image(name)) return *image;
     const Object& object = object_named(document, name);
-    if (!has_image(object)) throw input_error(name, 0, "a " + object.tag + " of type '" + object.type + "' has no texels");
+    if (!has_image(object))
+        throw input_error(name, 0, "a " + object.tag + " of type '" + object.type + "' has no texels");
     const std::string given = text_of(object, "image");
     if (const Texels* image = given.empty() ? nullptr : document.image(given)) return *image;
     const std::string path = document.resolve(text_of(object, "filename"), object.where);

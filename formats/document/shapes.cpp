@@ -327,7 +327,8 @@ bool ShapeBuilder::take_over() {
     const Scene& old = before->scene;
     Scene& scene = builder.scene;
     for (uint32_t i = 0; i < old.shapes.size(); ++i)  // a light that has no area: to be refused where it is placed
-        if (!old.shapes[i].primitive_count && materials_and_emitters[geometry.of_shape[i]].second != kNone) return false;
+        if (!old.shapes[i].primitive_count && materials_and_emitters[geometry.of_shape[i]].second != kNone)
+            return false;
     scene.vertices = old.vertices, scene.triangles = old.triangles, scene.quadrics = old.quadrics;
     scene.groups = old.groups, scene.instances = old.instances, scene.shapes = old.shapes;
     scene.degenerate_triangles = old.degenerate_triangles;

@@ -159,8 +159,7 @@ void check_names(Context& context, std::string_view json) {
     for (const auto& [kind, names] : kNames)
         if (is_extension(kind)) known.push_back(kind);
     for (const std::string& name : extensions)
-        if (!document::is_one_of(known, name))
-            context.leave_out(name, "extension '" + name + "'", nearly(known, name));
+        if (!document::is_one_of(known, name)) context.leave_out(name, "extension '" + name + "'", nearly(known, name));
 }
 
 }  // namespace ambilux::gltf

@@ -119,8 +119,8 @@ struct Editor {
         if (name.empty()) throw input_error(edit.name, 0, "it is an object, and no value can stand for it");
         value.name = name;
         erase_other(holder, name);
-        const auto there = std::find_if(holder.values.begin(), holder.values.end(),
-                                        [&](const Value& v) { return v.name == name; });
+        const auto there =
+            std::find_if(holder.values.begin(), holder.values.end(), [&](const Value& v) { return v.name == name; });
         if (there == holder.values.end())
             holder.values.push_back(value);
         else

@@ -29,7 +29,9 @@ struct Writer {
     std::map<const Object*, std::string> ids;
 
     std::string stem() const { return fs::path(path).stem().string() + "_files"; }
-    std::string beside(const std::string& name) const { return (fs::path(path).parent_path() / stem() / name).string(); }
+    std::string beside(const std::string& name) const {
+        return (fs::path(path).parent_path() / stem() / name).string();
+    }
 
     void write_object(xml_node parent, const Child& child) {
         const Object& object = *child.object;
@@ -150,8 +152,8 @@ struct Writer {
         property({"x", "y", "z"});
         if (!mesh.normals.empty()) property({"nx", "ny", "nz"});
         if (!mesh.uvs.empty()) property({"u", "v"});
-        bytes += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-                             mesh.faces.size());
+        bytes +=
+            fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.faces.size());
         const auto append = [&](const auto& value) {
             bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
         };
@@ -175,8 +177,8 @@ std::string text_of(const Editable& from, const std::string& path, bool writes_a
                           "it was no Mitsuba scene, whose XML could be written: `ambilux convert` makes one of it");
     pugi::xml_document xml;
     xml_node root = xml.append_child("scene");
-    root.append_attribute("version") = fmt::format("{}.{}.0", document.scene->version,
-                                                   document.scene->version == 0 ? 6 : 0).c_str();
+    root.append_attribute("version") =
+        fmt::format("{}.{}.0", document.scene->version, document.scene->version == 0 ? 6 : 0).c_str();
     Writer writer{document, path, writes_arrays, {}, {}};
     if (writes_arrays && (!document.given_meshes.empty() || !document.given_images.empty()))
         make_folders((fs::path(path).parent_path() / writer.stem()).string());

@@ -178,8 +178,7 @@ std::string Parameters::filename() const {
     const std::string name = text("filename", "");
     if (!name.empty()) return name;
     for (const Parameter& p : list)
-        if (!p.used && nearest_name({"filename"}, p.name) == "filename")
-            fail(p.where, unknown(p, {"filename"}));
+        if (!p.used && nearest_name({"filename"}, p.name) == "filename") fail(p.where, unknown(p, {"filename"}));
     fail(where, directive + " '" + type + "' has no filename");
 }
 

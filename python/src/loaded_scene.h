@@ -17,7 +17,8 @@ struct LoadedScene {
     Scene scene;
     Editable editable;
     LoadOptions options;  ///< that it was loaded with, without edits
-    std::shared_ptr<Structures> structures = std::make_shared<Structures>();  ///< shared with scenes that they serve too
+    std::shared_ptr<Structures> structures =
+        std::make_shared<Structures>();  ///< shared with scenes that they serve too
     std::vector<std::string> files;
     double seconds = 0;
 };

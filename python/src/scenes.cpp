@@ -110,9 +110,8 @@ SharedScene load(const std::string& path, std::optional<std::string> text, const
     options.lenient = lenient;
     options.light_picking = uniform_picking ? LightPicking::uniform : LightPicking::power;
     for (const std::string& limit : limits) set_limit(options.limits, limit);
-    make(*loaded, std::move(edits), [&](const LoadOptions& o) {
-        return text ? load_mitsuba_text(*text, path, o) : load_scene_file(path, o);
-    });
+    make(*loaded, std::move(edits),
+         [&](const LoadOptions& o) { return text ? load_mitsuba_text(*text, path, o) : load_scene_file(path, o); });
     return loaded;
 }
 
@@ -138,7 +137,8 @@ uint64_t shared_bytes(const LoadedScene& a, const LoadedScene& b) {
 
 void bind_scenes(nb::module_& m) {
     nb::class_<Edit>(m, "Edit", "A change of a scene by name.")
-        .def("__init__", [](Edit* e, const std::string& name, const std::string& text) { new (e) Edit{name, text, {}, {}}; })
+        .def("__init__",
+             [](Edit* e, const std::string& name, const std::string& text) { new (e) Edit{name, text, {}, {}}; })
         .def_static("mesh", &mesh_edit, "name"_a, "positions"_a, "faces"_a, "normals"_a.none(), "uvs"_a.none())
         .def_static("floats", &image_edit<float>, "name"_a, "texels"_a)
         .def_static("bytes", &image_edit<uint8_t>, "name"_a, "texels"_a);
@@ -156,7 +156,8 @@ void bind_scenes(nb::module_& m) {
         .def("image", &image_arrays, "object"_a)
         .def("edited", &edited, "edits"_a, "size"_a)
         .def("shared_bytes", &shared_bytes, "other"_a)
-        .def("shares_structure", [](const LoadedScene& a, const LoadedScene& b) { return a.structures == b.structures; })
+        .def("shares_structure",
+             [](const LoadedScene& a, const LoadedScene& b) { return a.structures == b.structures; })
         .def("text", [](const LoadedScene& s, const std::string& path) { return scene_text(s.editable, path); })
         .def("write", [](const LoadedScene& s, const std::string& path) { write_scene(s.editable, path); });
     m.def("load", &load, "path"_a, "text"_a.none(), "parameters"_a, "size"_a, "lenient"_a, "uniform_picking"_a,

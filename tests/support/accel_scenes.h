@@ -35,7 +35,8 @@ inline uint32_t add_diffuse(Scene& scene) {
 }
 
 inline void set_uvs(Scene& scene, const std::vector<Vec2f>& uvs) {
-    for (size_t i = 0; i < uvs.size(); ++i) scene.vertices.edit()[i].u = uvs[i].x, scene.vertices.edit()[i].v = uvs[i].y;
+    for (size_t i = 0; i < uvs.size(); ++i)
+        scene.vertices.edit()[i].u = uvs[i].x, scene.vertices.edit()[i].v = uvs[i].y;
 }
 
 inline void set_normals(Scene& scene, const std::vector<Vec3f>& normals) {
