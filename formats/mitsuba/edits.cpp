@@ -96,7 +96,10 @@ struct Editor {
         const std::string name = is_object ? at.parent->children[at.child].name : at.parameter;
         const std::string text =
             edit.text.starts_with('<') ? edit.text : element_of(edit, holder, name.empty() ? "value" : name);
+        // The new object may have the id of the one that it stands for.
+        auto id = document.ids.extract(edit.name);
         const Object made = mitsuba::parse_elements(document, edit.name, text, document.scene->version);
+        if (id) document.ids.insert(std::move(id));
         if (made.values.size() + made.children.size() != 1)
             throw input_error(edit.name, 0, "one value or one object is needed");
         if (!made.children.empty()) {

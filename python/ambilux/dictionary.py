@@ -153,7 +153,7 @@ def add_object(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> 
     depth = path.count(".")
     arrays = [key for key in (MESH_KEYS if tag == "shape" else (IMAGE_KEY,) if kind in ("bitmap", "envmap") else ()) if key in value]
     if depth == 0 or "id" in value or arrays:
-        attributes["id"] = str(value.get("id", name if depth == 0 else path))
+        attributes["id"] = str(value.get("id", name if depth == 0 else path.lstrip(".")))
     if arrays and tag == "shape":
         lines.meshes[attributes["id"]] = {key: value[key] for key in arrays}
     elif arrays:

@@ -110,32 +110,51 @@ class Params(Mapping[str, Any]):
             elif entry.get("kind") == "image":
                 edits.append(image_edit(entry["object"], name, value))
             else:
-                edits.append(_core.Edit(name, text_of(name, value, entry.get("kind"))))
+                lines = dictionary.Lines()
+                edits.append(_core.Edit(name, text_of(name, value, entry.get("kind"), lines)))
+                edits += array_edits(lines)
         return edits + [mesh_edit(name, arrays, self._core) for name, arrays in meshes.items()]
 
 
-def text_of(name: str, value: Any, kind: str | None) -> str:
+def array_edits(lines: dictionary.Lines) -> list[_core.Edit]:
+    """Arrays of the objects that these lines describe."""
+    return [*(mesh_edit(name, arrays) for name, arrays in lines.meshes.items()),
+            *(image_edit(name, f"{name}.data", value) for name, value in lines.images.items())]
+
+
+def refuse(name: str, kind: str, given: str) -> None:
+    unit = unit_of(name)
+    fail(name, f"{WANTED[kind]} is needed{f' ({unit})' if unit else ''}, not {given}")
+
+
+def element_of(name: str, value: Any, kind: str | None, lines: dictionary.Lines) -> str:
+    """A truth value, a text or a dictionary as an element of a scene file."""
+    named = name.endswith(("ior", "eta"))  # a number, or the name of a material
+    if isinstance(value, (bool, str)) and kind not in (None, "boolean" if isinstance(value, bool) else "text") and not (named and isinstance(value, str)):
+        refuse(name, kind, repr(value))
+    last = name.rsplit(".", 1)[-1]
+    if kind == "transform" or last.startswith("to_"):
+        return dictionary.element("transform", "", name=last) + "".join(dictionary.transform_steps(value, name)) + "</transform>"
+    try:
+        dictionary.add_value(lines, last, value, f".{name}")  # as an object inside of another, which gets no id of its own
+    except SceneError as e:
+        raise SceneError(str(e).lstrip("."), key=e.key.lstrip(".")) from None
+    return "".join(lines.text)
+
+
+def text_of(name: str, value: Any, kind: str | None, lines: dictionary.Lines) -> str:
     """A value as a scene file holds it, or as an element of one; the text of None is empty."""
     value = plain(value)
     if value is None:
         return ""
     array = None if isinstance(value, Mapping) else numbers_of(value)
     if array is None:
-        if isinstance(value, (bool, str)) and kind not in (None, "boolean" if isinstance(value, bool) else "text") and not (kind == "number" and isinstance(value, str)):
-            fail(name, f"{WANTED[kind]} is needed, not {value!r}")
-        lines = dictionary.Lines()
-        last = name.rsplit(".", 1)[-1]
-        if kind == "transform" or last.startswith("to_"):
-            lines.add(dictionary.element("transform", "", name=last) + "".join(dictionary.transform_steps(value, name)) + "</transform>", name)
-        else:
-            dictionary.add_value(lines, last, value, f"..{name}")
-        return "".join(lines.text)
+        return element_of(name, value, kind, lines)
     shapes = SHAPES.get(kind or "", None)
     if kind == "text" and array.ndim == 0:
         return f"{value!r}"  # such as the index of a glass that was named
     if kind == "text" or (shapes and not any(len(s) == array.ndim and all(a in (None, b) for a, b in zip(s, array.shape)) for s in shapes)):
-        unit = unit_of(name)
-        fail(name, f"{WANTED[kind or '']} is needed{f' ({unit})' if unit else ''}, not an array of shape {array.shape}")
+        refuse(name, kind or "text", f"an array of shape {array.shape}")
     if array.ndim == 2 and array.shape[1] == 2:
         return ", ".join(f"{w!r}:{v!r}" for w, v in array.tolist())
     numbers = value if isinstance(value, int) else array.ravel().tolist()

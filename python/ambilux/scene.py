@@ -11,8 +11,8 @@ from typing import Any
 
 from ambilux import _core, dictionary
 from ambilux.arrays import numbers_of, plain
-from ambilux.params import Params, image_edit, mesh_edit, unit_of
 from ambilux.errors import AmbiluxWarning, SceneError, UsageError
+from ambilux.params import Params, array_edits, unit_of
 
 
 def checked_size(size: tuple[int, int] | None) -> tuple[int, int]:
@@ -48,10 +48,8 @@ class Scene:
                  light_picking: str = "power", limits: Mapping[str, int | str] | None = None):
         lines = dictionary.to_xml(description)
         path = os.path.join(folder, "<dictionary>")
-        edits = [mesh_edit(name, arrays) for name, arrays in lines.meshes.items()]
-        edits += [image_edit(name, f"{name}.data", value) for name, value in lines.images.items()]
         try:
-            self._load(path, "\n".join(lines.text), {}, size, lenient, light_picking, limits, edits)
+            self._load(path, "\n".join(lines.text), {}, size, lenient, light_picking, limits, array_edits(lines))
         except SceneError as e:
             if e.file != path:
                 raise
@@ -160,7 +158,8 @@ class Scene:
                                                        "up": there[:3, 1] if up is None else point("up", up)}}
         if fov is not None:
             changes[f"{name}.fov"] = fov
-            changes[f"{name}.focal_length"] = None
+            if f"{name}.focal_length" in self.params:
+                changes[f"{name}.focal_length"] = None
         return self.with_params(changes)
 
     def to_dict(self) -> dict[str, Any]:

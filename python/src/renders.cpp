@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/outputs.h"
+#include "experiments/dry_run.h"
 #include "experiments/reference_store.h"
 #include "experiments/runner.h"
 #include "integrators/warnings.h"
@@ -125,6 +126,19 @@ std::pair<Reference, std::string> reference(const SharedScene& scene, const std:
     return {std::move(result.reference), json_text(result.attributes)};
 }
 
+/// What an experiment would do.
+std::string plan(const std::string& config, bool reduced) {
+    ExperimentRequest request;
+    request.config = config;
+    request.reduced = reduced;
+    std::string text;
+    run_unlocked([&](const volatile bool* interrupt) {
+        request.interrupt = interrupt;
+        text = describe_plan(request, default_hooks());
+    });
+    return text;
+}
+
 void experiment(const std::string& config, const std::string& output, const std::string& references, bool resume,
                 bool reduced, bool quiet) {
     const bool before = is_quiet();
@@ -166,6 +180,7 @@ void bind_renders(nb::module_& m) {
         .def_prop_ro("samples", &Render::samples)
         .def_prop_ro("seconds", &Render::seconds);
     m.def("reference", &reference, "scene"_a, "path"_a, "spp"_a, "settings"_a);
+    m.def("plan", &plan, "config"_a, "reduced"_a);
     m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a);
 }
 
