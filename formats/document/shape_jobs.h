@@ -83,6 +83,8 @@ void reserve_meshes(const std::vector<Job>& jobs, Scene& scene);
 /// Puts the mesh of a job into the scene, as that of the shape with this index.
 void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape);
 
+/// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
+Matrix local_form(Reader& in, const std::string& type);
 /// Sphere, disk or cylinder.
 Quadric make_quadric(Builder& builder, const Job& job);
 

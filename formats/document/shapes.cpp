@@ -63,25 +63,6 @@ bool is_tessellated(const std::string& type) {
 }
 bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
 
-/// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
-Matrix local_form(Reader& in, const std::string& type) {
-    const double radius = type == "disk" ? 1 : in.number("radius", 1);
-    if (!(radius > 0)) in.fail(in.where("radius"), "radius must be positive");
-    if (type == "sphere") {
-        const Vec3d c = in.vector("center", {0, 0, 0});
-        return translation(c.x, c.y, c.z) * scaling(radius, radius, radius);
-    }
-    if (type == "disk") return {};
-    const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
-    const double l = length(p1 - p0);
-    if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
-    // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
-    const Vec3d n = unit(p1 - p0);
-    const double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
-    const Vec3d s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, t = {b, sign + n.y * n.y * a, -n.y};
-    return from_columns(s, t, n, p0) * scaling(radius, radius, l);
-}
-
 /// Of an object that is made of others. False if it is none.
 bool ShapeBuilder::add_shapes_inside(Reader& in, const Matrix& outer, bool in_group) {
     const std::string& type = in.object().type;
@@ -389,12 +370,6 @@ void place_shapes(Builder& builder, ShapeBuilder& shapes) {
     add_instances(builder, shapes.groups, group_ends);
 }
 
-/// What a vector has from an index on.
-template <class T>
-std::vector<T> behind(const std::vector<T>& all, size_t first) {
-    return {all.begin() + ptrdiff_t(first), all.end()};
-}
-
 }  // namespace
 
 void build_shapes(Builder& builder, const Object& root) {
@@ -403,15 +378,15 @@ void build_shapes(Builder& builder, const Object& root) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false);
     if (!shapes.keys_tell_all) shapes.keys.clear();
     if (shapes.take_over()) return;
-    const size_t digests = builder.file_digests.size(), warnings = builder.scene.warnings.size(),
-                 notes = builder.scene.notes.size();
+    const auto digests = ptrdiff_t(builder.file_digests.size()), warnings = ptrdiff_t(builder.scene.warnings.size()),
+               notes = ptrdiff_t(builder.scene.notes.size());
     const uint64_t memory = builder.memory;
     place_shapes(builder, shapes);
     KeptGeometry& kept = builder.geometry;
     kept.keys = std::move(shapes.keys);
-    kept.digests = behind(builder.file_digests, digests);
-    kept.warnings = behind(builder.scene.warnings, warnings);
-    kept.notes = behind(builder.scene.notes, notes);
+    kept.digests.assign(builder.file_digests.begin() + digests, builder.file_digests.end());
+    kept.warnings.assign(builder.scene.warnings.begin() + warnings, builder.scene.warnings.end());
+    kept.notes.assign(builder.scene.notes.begin() + notes, builder.scene.notes.end());
     kept.memory = builder.memory - memory;
 }
 
