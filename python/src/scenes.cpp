@@ -14,6 +14,7 @@
 #include "python/src/bindings.h"
 #include "python/src/loaded_scene.h"
 #include "scene/info.h"
+#include "session/statistics.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -27,9 +28,8 @@ template <class T>
 using TexelsIn = nb::ndarray<const T, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
 using Size = std::pair<uint32_t, uint32_t>;
 
-template <class To, class T, int Columns>
-std::vector<To> copied(const Rows<T, Columns>& rows) {
-    static_assert(sizeof(To) == Columns * sizeof(T));
+template <class To>
+std::vector<To> copied(const auto& rows) {
     std::vector<To> out(rows.shape(0));
     if (!out.empty()) memcpy(out.data(), rows.data(), out.size() * sizeof(To));
     return out;
