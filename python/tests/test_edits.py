@@ -33,7 +33,7 @@ def test_parameters_are_a_mapping_of_numbers_and_arrays(box):
 def test_an_edit_is_the_file_that_is_written_with_it(box, tmp_path):
     other = box.with_params({"red.reflectance": np.array([0.1, 0.2, 0.6]), "sensor.fov": np.float32(30), "red": {"type": "plastic"}})
     other.save(tmp_path / "a.xml")
-    assert same(other, ambilux.load(tmp_path / "a.xml"))
+    assert same(other, ambilux.load(tmp_path / "a.xml", size=(16, 12)))  # a size of the loader is no part of the scene
     assert not same(other, box)
 
 
