@@ -150,7 +150,7 @@ std::vector<SceneEntry> swept_scenes(const Reader& r, const toml::table& t, cons
     if (!sweep) return {scene};
     for (const auto& [key, list] : r.table(*sweep, "sweep"))
         if (!is_named(key.str()))
-            r.check_keys({{key.str(), true}}, "'sweep' of [[scene]]", {"size", "max_depth"},
+            r.check_keys(toml::table{{key.str(), true}}, "'sweep' of [[scene]]", {"size", "max_depth"},
                          int(key.source().begin.line));
     for (const char* key : kSweptSceneKeys)
         if (t.get(key) && sweep->as_table()->get(key))
