@@ -77,6 +77,9 @@ class Params(Mapping[str, Any]):
         """The name of the first object of this kind."""
         return next((e["object"] for e in self._entries.values() if e["tag"] == tag), None)
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._entries)
 
