@@ -72,12 +72,12 @@ std::string nearest_name(const Names& known, const std::string& name) {
     return nearest;
 }
 
-std::string nearly(const Names& known, const std::string& name) {
+std::string suggestion(const Names& known, const std::string& name) {
     const std::string near = nearest_name(known, name);
     return near.empty() ? "" : ": '" + near + "' is known";
 }
 
-std::string meant(const Names& known, const std::string& name) {
+std::string suggestion_or_all(const Names& known, const std::string& name) {
     const std::string near = nearest_name(known, name);
     if (!near.empty()) return ": is '" + near + "' meant?";
     std::string all;

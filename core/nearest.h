@@ -13,14 +13,14 @@ using Names = std::vector<std::string>;
 /// empty if there is none.
 std::string nearest_name(const Names& known, const std::string& name);
 /// The end of a message about `name`: which of these it nearly is; empty if none.
-std::string nearly(const Names& known, const std::string& name);
+std::string suggestion(const Names& known, const std::string& name);
 /// The same, or if it is none of them nearly, the names of all.
-std::string meant(const Names& known, const std::string& name);
+std::string suggestion_or_all(const Names& known, const std::string& name);
 template <class T>
-std::string nearly(const std::map<std::string, T>& known, const std::string& name) {
+std::string suggestion(const std::map<std::string, T>& known, const std::string& name) {
     Names names;
     for (const auto& entry : known) names.push_back(entry.first);
-    return nearly(names, name);
+    return suggestion(names, name);
 }
 
 }  // namespace ambilux

@@ -1,6 +1,7 @@
 // Arrays that copies share until one of them changes.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <initializer_list>
@@ -77,7 +78,10 @@ public:
         all.insert(all.end(), values, values + count);
         size_ = all.size();
     }
-    bool operator==(const std::vector<T>& other) const { return std::vector<T>(begin(), end()) == other; }
+    bool operator==(const SharedArray& other) const { return std::equal(begin(), end(), other.begin(), other.end()); }
+    bool operator==(const std::vector<T>& other) const {
+        return std::equal(begin(), end(), other.begin(), other.end());
+    }
 
 private:
     std::vector<T>& own() {

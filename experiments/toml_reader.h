@@ -26,9 +26,9 @@ struct TomlReader {
     void check_keys(const toml::table& table, const std::string& where, const Names& known, int line = 0) const {
         for (const auto& [key, node] : table)
             if (std::find(known.begin(), known.end(), key.str()) == known.end())
-                throw input_error(
-                    file, line ? line : int(key.source().begin.line),
-                    fmt::format("unknown key '{}' in {}{}", key.str(), where, meant(known, std::string(key.str()))));
+                throw input_error(file, line ? line : int(key.source().begin.line),
+                                  fmt::format("unknown key '{}' in {}{}", key.str(), where,
+                                              suggestion_or_all(known, std::string(key.str()))));
     }
     const toml::node& need(const toml::table& table, std::string_view key, const std::string& where) const {
         if (const toml::node* node = table.get(key)) return *node;

@@ -97,14 +97,6 @@ void append_environment(Scene& scene, Emitter& emitter, size_t height, const flo
     emitter.env_cells = uint32_t(rows_at + padded(2 * height));
 }
 
-/// Bytes of a bitmap.
-size_t texel_bytes(const Texture& t) {
-    return size_t(t.width) * t.height *
-           (t.format == TexelFormat::rgba8     ? 4
-            : t.format == TexelFormat::rgba16f ? 8
-                                               : 16);
-}
-
 /// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get
 /// these tickets.
 void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, const std::vector<uint32_t>& row_tickets,
@@ -137,7 +129,8 @@ bool take_environment(Scene& scene, Emitter& emitter, const Scene* before) {
                   &b = before->textures[size_t(old.radiance.texture)];
     const uint8_t *texels = scene.texels.data() + a.offset, *old_texels = before->texels.data() + b.offset;
     if (a.width != b.width || a.height != b.height || a.format != b.format) return false;
-    if (texels != old_texels && memcmp(texels, old_texels, texel_bytes(a)) != 0) return false;
+    if (texels != old_texels && memcmp(texels, old_texels, size_t(a.width) * a.height * bytes_of_texel(a.format)) != 0)
+        return false;
     const size_t cells_at = padded(2 * size_t(a.height));
     append_environment(scene, emitter, a.height, before->tables.data() + old.env_rows,
                        cells_at + 4 * size_t(a.width) * a.height);

@@ -28,9 +28,7 @@ struct LoadedImage {
     Sha256Digest digest{};  ///< of its file
     std::vector<std::string> notes;
 
-    uint64_t bytes() const {
-        return uint64_t(width) * height * (format == TexelFormat::rgba8 ? 4 : format == TexelFormat::rgba16f ? 8 : 16);
-    }
+    uint64_t bytes() const { return uint64_t(width) * height * bytes_of_texel(format); }
 };
 
 /// What triangles and analytic shapes were made of. Materials and emitters are no part of it.

@@ -15,7 +15,7 @@ std::string what_is_meant(const std::string& tag, const std::string& type) {
     Plugins same;
     for (const auto& [name, of] : tags)
         if (of == tag && name != type) same.push_back(name);
-    return known == tags.end() ? nearly(same, type) : "";
+    return known == tags.end() ? suggestion(same, type) : "";
 }
 
 std::map<std::string, std::string> plugins() {

@@ -290,7 +290,7 @@ void Reader::leave(std::initializer_list<LeftOut> parameters, const std::string&
 
 std::string Reader::unknown(const Value& value, const Plugins& known) const {
     return fmt::format("unknown parameter '{}' of {} '{}'{}", value.name, object_.tag, object_.type,
-                       nearly(known, value.name));
+                       suggestion(known, value.name));
 }
 
 void Reader::fail_without(const std::string& name, const std::string& message) const {
@@ -309,7 +309,7 @@ void Reader::finish() {
             builder_.note(v.where,
                           fmt::format("parameter '{}' of {}{} is not known and left out{}{}", v.name, object_.tag,
                                       object_.type.empty() ? "" : " '" + object_.type + "'",
-                                      object_.version < 2 ? ", as Mitsuba 0.6 does" : "", nearly(known, v.name)));
+                                      object_.version < 2 ? ", as Mitsuba 0.6 does" : "", suggestion(known, v.name)));
         else
             builder_.refuse(v.where, unknown(v, known), "it is ignored");
     for (const Child& child : object_.children)

@@ -186,7 +186,7 @@ struct Parser {
                     const auto it = document.ids.find(child.ref);
                     if (it == document.ids.end())
                         fail(child.where,
-                             "reference to unknown id '" + child.ref + "'" + nearly(document.ids, child.ref));
+                             "reference to unknown id '" + child.ref + "'" + suggestion(document.ids, child.ref));
                     child.object = it->second;
                 }
         check_references(document);

@@ -86,7 +86,7 @@ void ValueParser::allow(const XmlSource& source, const pugi::xml_node& node, std
     for (const pugi::xml_attribute& a : node.attributes())
         if (std::none_of(names.begin(), names.end(), [&](const char* n) { return std::string(n) == a.name(); }))
             fail(where(source, node), std::string("unexpected attribute '") + a.name() + "' in <" + node.name() + ">" +
-                                          nearly({names.begin(), names.end()}, a.name()));
+                                          suggestion({names.begin(), names.end()}, a.name()));
 }
 
 std::string ValueParser::parameter_name(const XmlSource& source, const pugi::xml_node& node) {
@@ -157,7 +157,7 @@ Matrix ValueParser::parse_transform(const XmlSource& source, const pugi::xml_nod
             if (!is_affine(m)) fail(at, "<matrix> is not affine: its last row must be 0 0 0 1");
         } else {
             fail(at, std::string("unknown element <") + step.name() + "> in <transform>" +
-                         nearly({"translate", "scale", "rotate", "lookat", "matrix"}, tag));
+                         suggestion({"translate", "scale", "rotate", "lookat", "matrix"}, tag));
         }
         total = m * total;
     }

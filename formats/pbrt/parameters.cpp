@@ -183,7 +183,7 @@ std::string Parameters::filename() const {
 }
 
 std::string Parameters::unknown(const Parameter& p, const std::vector<std::string>& known) const {
-    return "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" + nearly(known, p.name);
+    return "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" + suggestion(known, p.name);
 }
 
 void Parameters::finish(Report& report) const {

@@ -208,16 +208,20 @@ def value_of(node: ElementTree.Element, core: _core.Scene) -> Any:
     return object_of(node, core)
 
 
+def unused(base: str, taken: Mapping[str, Any]) -> str:
+    """`base`, or with a number from 2 on where it is taken."""
+    number, key = 2, base
+    while key in taken:
+        key, number = f"{base}_{number}", number + 1
+    return key
+
+
 def object_of(node: ElementTree.Element, core: _core.Scene) -> dict[str, Any]:
     out: dict[str, Any] = {"type": node.get("type", "")}
     if node.get("id"):
         out["id"] = node.get("id")
     for inner in node:
-        key = base = inner.get("name") or inner.tag
-        number = 2
-        while key in out:
-            key, number = f"{base}_{number}", number + 1
-        out[key] = value_of(inner, core)
+        out[unused(inner.get("name") or inner.tag, out)] = value_of(inner, core)
     if node.tag == "shape" and str(out.get("mesh", "")).startswith("array "):
         arrays = core.mesh(out.pop("mesh"))
         origin = arrays.pop("origin")
@@ -236,10 +240,7 @@ def from_xml(text: str, core: _core.Scene) -> dict[str, Any]:
     if root.get("version") != "3.0.0":
         scene["version"] = root.get("version")
     for node in root:
-        key = base = node.get("id") or node.tag
-        number = 2
-        while key in scene:
-            key, number = f"{base}_{number}", number + 1
+        key = unused(node.get("id") or node.tag, scene)
         scene[key] = value_of(node, core)
         scene[key].pop("id", None)
     return scene

@@ -9,7 +9,6 @@ the image file. The median of the repetitions, by the wall clock. With --ptx als
 that hold PTX (`ambilux devices` says so).
 """
 
-import argparse
 import json
 import os
 import pathlib
@@ -18,16 +17,9 @@ import subprocess
 import tempfile
 import time
 
+from scenes_and_methods import name_of, parser_for, settings_of
+
 PARTS = ("load", "device", "structure", "upload", "kernels", "sample", "rest")
-
-
-def options(method):
-    """Of "bdpt lvc connections=1", as options."""
-    integrator, *more = method.split()
-    found = ["-i", integrator]
-    for word in more:
-        found += ["--set", word] if "=" in word else ["--variant", word]
-    return found
 
 
 def first_image(a, scene, method, environment):
@@ -35,7 +27,7 @@ def first_image(a, scene, method, environment):
     with tempfile.TemporaryDirectory() as folder:
         stats = pathlib.Path(folder) / "stats.json"
         command = [a.program, "render", scene, "-o", f"{folder}/first.exr", "--spp", "1", "--backend", a.backend, "--size", a.size, "--max-depth", "8",
-                   "--json", stats, *options(method)]
+                   "--json", stats, *(word for setting in settings_of(method) for word in ("--set", "=".join(setting)))]
         start = time.perf_counter()
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env={**os.environ, **environment})
         whole = time.perf_counter() - start
@@ -51,18 +43,8 @@ def median_of(runs):
     return {key: statistics.median(run[key] for run in runs) for key in runs[0]}
 
 
-def name_of(scene):
-    path = pathlib.Path(scene)
-    return path.parent.name if path.stem == "scene" else path.stem
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program")
-    parser.add_argument("scenes", nargs="+")
-    parser.add_argument("--backend", default="cuda")
-    parser.add_argument("--size", default="1920x1080")
-    parser.add_argument("--methods", nargs="+", default=["path", "bdpt lvc connections=1"])
+    parser = parser_for(__doc__, methods=True)
     parser.add_argument("--ptx", action="store_true")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--json", help="write all figures to this file")

@@ -8,7 +8,6 @@ a second; milliseconds from a move to its picture, median and 95th percentile; a
 picture with its way to the host, and the JPEG. What is left of the latency is the render that was under way, the way through the socket and this client.
 """
 
-import argparse
 import http.client
 import json
 import math
@@ -22,6 +21,8 @@ import subprocess
 import sys
 import threading
 import time
+
+from scenes_and_methods import name_of, parser_for, settings_of
 
 PARTS = ("restart", "first_sample", "picture", "jpeg")
 
@@ -127,13 +128,6 @@ def latencies(viewer, form, moves, camera):
     return sorted(found), {p: statistics.median(x.get(p, 0) for x in parts) for p in PARTS}
 
 
-def settings_of(method):
-    """Of "bdpt lvc connections=1", as pairs for the page."""
-    integrator, *more = method.split()
-    pairs = [["integrator", integrator]]
-    return pairs + [word.split("=", 1) if "=" in word else ["variant", word] for word in more]
-
-
 def measure(viewer, method, form, a):
     camera = json.loads(viewer.get("/scene"))["camera"]
     viewer.post("/method", settings_of(method))
@@ -152,18 +146,8 @@ def measure(viewer, method, form, a):
             "dragged_width": width, "latency_median": statistics.median(times), "latency_95": late, "parts": parts}
 
 
-def name_of(scene):
-    path = pathlib.Path(scene)
-    return path.parent.name if path.stem == "scene" else path.stem
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program")
-    parser.add_argument("scenes", nargs="+")
-    parser.add_argument("--backend", default="cuda")
-    parser.add_argument("--size", default="1920x1080")
-    parser.add_argument("--methods", nargs="+", default=["path", "bdpt lvc connections=1"])
+    parser = parser_for(__doc__, methods=True)
     parser.add_argument("--formats", nargs="+", default=["jpeg"], choices=["jpeg", "rgb"])
     parser.add_argument("--seconds", type=float, default=3, help="of each of the two rates")
     parser.add_argument("--moves", type=int, default=40, help="of the latency")

@@ -11,7 +11,7 @@ TEST_CASE("what may be meant by a name is what the field calls so, or what it ne
     CHECK(nearest_name(known, "seed") == "seeds");
     CHECK(nearest_name(known, "reflectnace") == "reflectance");
     CHECK(nearest_name(known, "thickness").empty());
-    CHECK(nearly(known, "albedo") == ": 'reflectance' is known");
-    CHECK(meant(known, "seed") == ": is 'seeds' meant?");
-    CHECK(meant({"a", "bcd"}, "thickness") == "; known are: a, bcd");
+    CHECK(suggestion(known, "albedo") == ": 'reflectance' is known");
+    CHECK(suggestion_or_all(known, "seed") == ": is 'seeds' meant?");
+    CHECK(suggestion_or_all({"a", "bcd"}, "thickness") == "; known are: a, bcd");
 }

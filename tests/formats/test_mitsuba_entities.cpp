@@ -115,7 +115,7 @@ TEST_CASE("a scene of format 0.x without emitters is lit by sun and sky, a newer
                                     "0.6.0");
     REQUIRE(old.emitters.size() == same.emitters.size());
     REQUIRE(!old.emitters.empty());
-    CHECK(old.texels == std::vector<uint8_t>(same.texels.begin(), same.texels.end()));
+    CHECK(old.texels == same.texels);
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k) CHECK(old.emitters[0].to_world.m[i][k] == same.emitters[0].to_world.m[i][k]);
     CHECK_FALSE(has_note(same, "no emitter"));

@@ -124,7 +124,7 @@ TEST_CASE("both generations of the format give the same scene") {
     CHECK(memcmp(&modern.sensor, &old.sensor, sizeof(Sensor)) == 0);
     CHECK(memcmp(modern.bsdfs.data(), old.bsdfs.data(), sizeof(BsdfRecord)) == 0);
     CHECK(memcmp(modern.emitters.data(), old.emitters.data(), sizeof(Emitter)) == 0);
-    CHECK(modern.tables == std::vector<float>(old.tables.begin(), old.tables.end()));
+    CHECK(modern.tables == old.tables);
     CHECK(modern.content_hash != old.content_hash);
     CHECK(modern.vertices[1].p == Vec3f{2, 0, 0});
     CHECK_FALSE(modern.shapes[0].flags & kShapeHasNormals);
