@@ -8,7 +8,7 @@
 namespace ambilux {
 namespace {
 
-constexpr uint32_t kSamples = 4;
+constexpr uint32_t kLeastSamples = 4;
 
 std::vector<double> variance_by_block(const FilmMoments& film) {
     const FilmBlocks all = FilmBlocks::of(film.width, film.height);
@@ -41,18 +41,28 @@ std::vector<double> variance_by_block(const FilmMoments& film) {
 
 }  // namespace
 
-Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint32_t first) {
+Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint32_t first, double seconds) {
     const std::unique_ptr<Renderer> renderer = make(settings);
     renderer->render(first, 1);
-    const auto start = Clock::now();
-    renderer->render(first + 1, kSamples - 1);
-    const double seconds = seconds_since(start) / (kSamples - 1);
-    return {variance_by_block(renderer->film()), seconds};
+    // Of the longest batch, whose launches cost the least beside their items.
+    double spent = 0, longest = 0, of_sample = 0;
+    for (uint32_t done = 1, batch = kLeastSamples - 1; done < kLeastSamples || spent < seconds;) {
+        const auto start = Clock::now();
+        const uint32_t samples = renderer->render(first + done, batch);
+        const double took = seconds_since(start);
+        if (took > longest) of_sample = took / samples;
+        longest = std::max(longest, took);
+        spent += took;
+        done += samples;
+        batch = std::clamp(uint32_t(std::max(0.0, seconds - spent) / took * batch), 1u, 4 * batch);
+    }
+    const FilmMoments film = renderer->film();
+    return {variance_by_block(film), of_sample, double(film.samples)};
 }
 
-double measured_ratio(const Measured& a, const Measured& b) {
+double variance_ratio(const Measured& a, const Measured& b) {
     const std::vector<double> variance = trimmed_means({a.variance, b.variance});
-    return variance[1] * b.seconds / (variance[0] * a.seconds);
+    return variance[1] / variance[0];
 }
 
 }  // namespace ambilux

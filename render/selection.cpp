@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
@@ -28,7 +29,15 @@ constexpr double kUnseen = 0.2;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
-constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
+/// Others whose product is within this factor may be as good.
+constexpr double kNear = 1.6;
+/// In a render of so many seconds or more the best of up to so many families are tried out, each for this share of it.
+constexpr double kLongRender = 4, kTrialShare = 0.01;
+constexpr size_t kTried = 3;
+/// A trial of so many times the pilot's paths knows variances better than the pilot, but for those that it finds to be
+/// less than predicted by more than this factor.
+constexpr double kManyPaths = 16, kHidden = 2;
+constexpr uint32_t kFirstTimedSample = 0xff000000u;  ///< far from those of the image
 
 std::string joined(const SettingTexts& settings) {
     std::string text;
@@ -77,7 +86,9 @@ double median(std::vector<double> values) {
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
 /// that of the others.
 uint32_t family(const SelectionCandidate& c) {
-    return (c.pilot.light_subpaths != 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0);
+    const bool learns = c.offer.least_subpaths > 0;
+    return (c.pilot.light_subpaths != 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0) +
+           (learns ? 8 : 0);
 }
 
 /// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of
@@ -210,6 +221,7 @@ public:
         }
         for (size_t c = predicted.size(); c < candidates_.size(); ++c)
             if (excluded_[c].empty()) measure_beside(ranked_[0], c, pilot.expected_samples);
+        try_out(worth_a_trial(pilot), pilot);
         rank();
 
         choosing_ = seconds_since(start_);
@@ -223,9 +235,8 @@ public:
 
 private:
     /// Of the whole render.
-    double eye_subpaths(const Pilot& pilot) const {
-        return pilot.expected_samples * scene_.sensor.crop_width * scene_.sensor.crop_height;
-    }
+    double eye_subpaths(const Pilot& pilot) const { return pilot.expected_samples * pixels(); }
+    double pixels() const { return double(scene_.sensor.crop_width) * scene_.sensor.crop_height; }
     double score(size_t c) const { return variance_[c] * cost_[c]; }
 
     void rank() {
@@ -269,22 +280,67 @@ private:
         }
     }
 
+    /// The best of each family that is near the best, where a render is long and a pilot, with its few subpaths, may
+    /// have missed what decides: bright hits that all candidates have, and times of a device.
+    std::vector<size_t> worth_a_trial(const Pilot& pilot) const {
+        std::vector<size_t> found;
+        const bool is_long = settings_.expected_seconds >= kLongRender && pilot.expected_samples * kTrialShare >= 4;
+        if (!is_long || settings_.deterministic || settings_.expected_samples > 0) return found;
+        std::set<uint32_t> families;
+        for (const size_t c : ranked_)
+            if (score(c) < kNear * score(ranked_[0]) && found.size() < kTried && !candidates_[c].offer.measured &&
+                families.insert(family(candidates_[c])).second)
+                found.push_back(c);
+        return found;
+    }
+
+    /// Replaces work by time for those that are tried, and predicted variances by what many more paths than the pilot's
+    /// have. A variance that is much less than predicted stays: the pilot knows of light that single hits bring.
+    void try_out(const std::vector<size_t>& tried, const Pilot& pilot) {
+        if (tried.size() < 2) return;
+        std::vector<Measured> of;
+        std::vector<std::vector<double>> variances;
+        for (const size_t c : tried) {
+            const std::optional<Measured> m = measured(c, kFirstTimedSample, kTrialShare * settings_.expected_seconds);
+            if (!m) return;
+            of.push_back(*m);
+            variances.push_back(m->variance);
+        }
+        const double rays_per_second = work_[tried[0]] / of[0].seconds, before = variance_[tried[0]];
+        const std::vector<double> seen = trimmed_means(variances);
+        double fewest = kInfinity;
+        for (const Measured& m : of) fewest = std::min(fewest, m.samples * pixels());
+        for (size_t i = 0; i < tried.size(); ++i) {
+            const size_t c = tried[i];
+            seconds_[c] = of[i].seconds;
+            cost_[c] = of[i].seconds * rays_per_second;
+            if (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i]) variance_[c] = seen[i];
+        }
+        // Others stay where they were beside the one that was the best.
+        for (size_t c = 0; c < candidates_.size(); ++c)
+            if (std::find(tried.begin(), tried.end(), c) == tried.end()) variance_[c] *= variance_[tried[0]] / before;
+    }
+
+    /// Nothing where the device has no room for it.
+    std::optional<Measured> measured(size_t c, uint32_t first, double seconds) const {
+        try {
+            return measure(settings_of(settings_, candidates_[c]), make_, first, seconds);
+        } catch (const Error& error) {
+            if (error.code != ExitCode::device) throw;
+            return {};
+        }
+    }
+
     /// Scales what is known of the best to a candidate that was not predicted. Of samples behind those that are
     /// expected: a radius that shrinks is smallest there, and variance greatest.
     void measure_beside(size_t best, size_t other, double behind) {
         if (!excluded_[best].empty()) return void(variance_[other] = 1.0);
-        try {
-            const auto measured = [&](size_t c) {
-                return measure(settings_of(settings_, candidates_[c]), make_, uint32_t(behind));
-            };
-            const Measured a = measured(best), b = measured(other);
-            variance_[other] = variance_[best] * measured_ratio(a, b);
-            cost_[other] = cost_[best];
-            seconds_[other] = b.seconds;
-        } catch (const Error& error) {
-            if (error.code != ExitCode::device) throw;
-            excluded_[other] = "found no room to be measured";
-        }
+        const std::optional<Measured> a = measured(best, uint32_t(behind), 0),
+                                      b = a ? measured(other, uint32_t(behind), 0) : a;
+        if (!b) return void(excluded_[other] = "found no room to be measured");
+        variance_[other] = variance_[best] * variance_ratio(*a, *b);
+        cost_[other] = cost_[best] * b->seconds / a->seconds;
+        seconds_[other] = b->seconds;
     }
 
     /// 0: the device has no room for it.
