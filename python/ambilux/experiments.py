@@ -16,13 +16,13 @@ from ambilux.errors import SceneError, UsageError
 
 
 class Results:
-    """The folder of an experiment. Each property is a frame of analysis.frames (needs pandas); columns: docs/experiments.md."""
+    """The folder of an experiment. Each property is a frame of ambilux.analysis.frames (needs pandas); columns: docs/experiments.md."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder)
 
     def _frame(self, name: str) -> Any:
-        from analysis import experiment, frames
+        from ambilux.analysis import experiment, frames
 
         try:
             return getattr(frames, name)(self.folder)
