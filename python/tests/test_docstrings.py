@@ -9,17 +9,17 @@ import numpy
 import pytest
 from conftest import SCENES
 
-MODULES = ("ambilux", "ambilux.scene", "ambilux.image", "ambilux.rendering")
+MODULES = ("ambilux", "ambilux.scene", "ambilux.image", "ambilux.rendering", "ambilux.records", "ambilux.commands")
 
 
-def names(scene):
-    return {"ambilux": ambilux, "numpy": numpy, "SCENES": SCENES, "scene": scene}
+def names(scene, out):
+    return {"ambilux": ambilux, "numpy": numpy, "SCENES": SCENES, "OUT": out, "scene": scene}
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_examples_of(name, scene):
+def test_examples_of(name, scene, tmp_path):
     module = importlib.import_module(name)
-    tests = doctest.DocTestFinder(exclude_empty=True).find(module, name, extraglobs=names(scene))
+    tests = doctest.DocTestFinder(exclude_empty=True).find(module, name, extraglobs=names(scene, tmp_path))
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     for test in tests:
         runner.run(test)

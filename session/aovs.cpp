@@ -1,4 +1,4 @@
-#include "cli/aovs.h"
+#include "session/aovs.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -29,15 +29,23 @@ std::vector<std::string> known_aovs() {
     return names;
 }
 
-void check_aovs(const std::vector<std::string>& names) {
+void check_aovs(const std::vector<std::string>& names, const std::string& prefix) {
     const std::vector<std::string> known = known_aovs();
     for (size_t i = 0; i < names.size(); ++i) {
         if (std::find(known.begin(), known.end(), names[i]) == known.end())
             throw Error(ExitCode::usage,
-                        fmt::format("--aov {}: not known; known are {}", names[i], fmt::join(known, ", ")));
+                        fmt::format("{}aov {}: not known; known are {}", prefix, names[i], fmt::join(known, ", ")));
         if (std::find(names.begin(), names.begin() + long(i), names[i]) != names.begin() + long(i))
-            throw Error(ExitCode::usage, fmt::format("--aov {}: asked for twice", names[i]));
+            throw Error(ExitCode::usage, fmt::format("{}aov {}: asked for twice", prefix, names[i]));
     }
+}
+
+void check_aovs_of(const RenderSettings& settings, const std::vector<std::string>& names, const std::string& prefix) {
+    if (settings.sampler == Sampler::sobol && std::find(names.begin(), names.end(), "variance") != names.end())
+        throw Error(ExitCode::usage,
+                    prefix +
+                        "aov variance: with sampler=sobol samples depend on each other, and their scatter is not "
+                        "the error of the mean; render several seeds");
 }
 
 std::vector<Layer> make_aovs(const Scene& scene, const RenderSettings& settings, const FilmMoments& film,
