@@ -164,7 +164,7 @@ def pixels(value: Any) -> np.ndarray:
 
 
 def read(path: str | os.PathLike[str]) -> Image:
-    """Reads an EXR file; a reference with its standard errors."""
+    """Reads an EXR file; a reference with its standard errors. float32 of height x width x 3. Raises SceneError that names the file and what is wrong with it."""
     core, attributes = _core.read_image(os.fspath(path))
     stated = json.loads(attributes)
     image = Image(core.rgb, core.stderr, core.samples, attributes=stated)
@@ -184,7 +184,8 @@ def as_image(value: Any) -> Image:
 def compare(image: Any, reference: Any) -> dict[str, float | None]:
     """Error of an image against a reference: the figures of `ambilux compare --json`, None where they are not known.
 
-    Both may be images, arrays or names of EXR files. Do not take images of equal seeds: what they share is no error of either.
+    Both may be images, arrays of height x width x 3 or names of EXR files. RMSE and bias have the unit of the images, relMSE and MAPE none; `bias_z` counts standard
+    errors (docs/experiments.md). Do not take images of equal seeds: what they share is no error of either. Raises UsageError for different sizes.
 
     >>> one, other = (ambilux.render(scene, spp=4, seed=seed) for seed in (1, 2))
     >>> metrics = ambilux.compare(one, other)

@@ -29,7 +29,7 @@ def unit_of(name: str) -> str:
     return UNITS.get(last, UNITS["reflectance"] if last.endswith(("reflectance", "transmittance")) else "")
 
 
-def fail(name: str, message: str) -> None:
+def fail(name: str, message: str) -> NoReturn:
     raise SceneError(f"{name}: {message}", key=name)
 
 

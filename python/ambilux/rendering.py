@@ -133,7 +133,7 @@ class Step:
 def progressive(scene: Scene | str | os.PathLike[str], integrator: str | None = None, variant: str | None = None, *, spp: int | None = None,
                 time: float | None = None, every: float = 0.5, seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None,
                 backend: str | None = None, device: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
-    """The same render, with the image so far about `every` seconds and at the end.
+    """The same render, with the image so far about `every` seconds of rendering and at the end. Raises as `render` does.
 
     >>> steps = list(ambilux.progressive(scene, spp=64, every=0.01))
     >>> steps[-1].samples, all(a.samples < b.samples for a, b in zip(steps, steps[1:]))
@@ -159,7 +159,11 @@ def steps_of(core: _core.Render, every: float, device: str | None) -> Iterator[S
 def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str], *, spp: int, seed: int | None = None,
               size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
               settings: Mapping[str, Any] | None = None) -> Image:
-    """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
+    """Ground truth with its standard error, in the EXR file at `path`, which is continued if it exists. An interrupt saves what is finished.
+
+    `spp` is of the whole reference, at least 2. The path tracer makes it unless `settings` names another integrator. Raises SceneError if the file is of another scene,
+    size, seed or method, UsageError for settings that a reference cannot have.
+    """
     if os.fspath(path).lower().endswith(".png"):
         raise UsageError(f"{os.fspath(path)}: a reference is an EXR file, whose name ends in .exr")
     core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),

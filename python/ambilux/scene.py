@@ -172,7 +172,8 @@ class Scene:
         return dictionary.from_xml(self._core.text(""), self._core)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the scene as Mitsuba's XML; arrays become files in a folder beside it. What another format described is written by `ambilux.convert`."""
+        """Writes the scene as Mitsuba's XML; arrays become files in a folder beside it. What another format described is written by
+        `ambilux.convert`. Raises UsageError for another ending, DeviceError if files cannot be written."""
         name = os.fspath(path)
         if not name.lower().endswith(".xml"):
             raise UsageError(f"{name}: scenes are written as .xml")
@@ -186,7 +187,8 @@ class Scene:
 def load(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None, lenient: bool = False, light_picking: str = "power",
          limits: Mapping[str, int | str] | None = None, **defines: Any) -> Scene:
     """Reads a scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb). `defines` are values of $parameters of Mitsuba scenes; the others are options
-    of `ambilux render`.
+    of `ambilux render`; `size` is (width, height) in pixels, `limits` as in docs/limits.md. Raises SceneError with `file` and `line`. What is replaced or done in another way
+    is a warning (AmbiluxWarning, AmbiluxNote).
 
     >>> ambilux.load(SCENES / "cornell.xml", resx=40, resy=30).size
     (40, 30)
