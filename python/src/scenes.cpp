@@ -154,7 +154,7 @@ void bind_scenes(nb::module_& m) {
         .def("text", [](const LoadedScene& s, const std::string& path) { return scene_text(s.editable, path); })
         .def("write", [](const LoadedScene& s, const std::string& path) { write_scene(s.editable, path); });
     m.def("load", &load, "path"_a, "text"_a.none(), "parameters"_a, "size"_a, "lenient"_a, "uniform_picking"_a,
-          "limits"_a, "edits"_a);
+          "limits"_a, "edits"_a = std::vector<Edit>());
 }
 
 }  // namespace ambilux

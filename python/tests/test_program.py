@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import ambilux
 import numpy as np
@@ -182,3 +183,13 @@ def test_light_vertices_are_those_of_traces(glass):
     np.testing.assert_allclose(first, np.broadcast_to(np.pi * np.pi * 0.25**2 * np.array([110, 100, 85]), first.shape), rtol=1e-3)
     with pytest.raises(ambilux.UsageError, match="light"):
         ambilux.light_vertices(glass, integrator="path")
+
+
+def test_another_build_is_driven_by_its_module(monkeypatch):
+    monkeypatch.syspath_prepend(SCENES.parent / "scripts" / "peers")
+    import peer_build
+
+    stated, render = peer_build.start({"module": str(Path(ambilux.__file__).parents[1]), "scene": str(SCENES / "cornell.xml"), "parameters": {}, "film": [8, 6],
+                                       "crop": [0, 0, 8, 6], "max_depth": 4, "rr_depth": 5, "settings": [("integrator", "bdpt"), ("backend", "cpu")]})
+    image, seconds, samples = render({"render_seed": 1, "seed": 1, "first": 0, "samples": 2})
+    assert image.shape == (6, 8, 3) and seconds > 0 and samples == 2 and ambilux.__version__ in stated["version"]
