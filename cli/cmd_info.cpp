@@ -4,7 +4,6 @@
 
 #include "cli/commands.h"
 #include "core/error.h"
-#include "scene/info.h"
 #include "session/statistics.h"
 
 namespace ambilux {
@@ -42,21 +41,9 @@ void print(const nlohmann::json& value, int indent) {
 int info(const InfoArguments& o) {
     const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     const RenderSettings settings = o.render.settings(loaded.scene);
-    nlohmann::json json = scene_info(loaded.scene);
     // What this scene needs of the renderer is the renderer's own word.
     const RenderStats stats = make_renderer(loaded.scene, settings)->stats();
-    json["kernels"] = {{"integrator", settings.integrator},
-                       {"variant", settings.variant},
-                       {"backend", stats.backend},
-                       {"device", stats.device},
-                       {"features", stats.features},
-                       {"skipped", stats.skipped},
-                       {"accel", stats.accel},
-                       {"memory", setting_text(settings, "memory")},
-                       {"memory_bytes", stats.memory_bytes}};
-    json["seconds"] = seconds_json(stats, loaded.seconds);
-    json["seconds"].update(
-        {{"read", loaded.times.read}, {"place", loaded.times.place}, {"finish", loaded.times.finish}});
+    const nlohmann::json json = info_json(loaded.scene, settings, stats, loaded.seconds, loaded.times);
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json != "-") print(json, 0);
     return int(ExitCode::done);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "cli/aovs.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/interrupt.h"
@@ -21,9 +20,11 @@
 #include "film/png_io.h"
 #include "integrators/registry.h"
 #include "integrators/warnings.h"
+#include "session/aovs.h"
 #include "session/kept_film.h"
 #include "session/parallel/parallel_render.h"
 #include "session/render_plan.h"
+#include "session/replays.h"
 #include "session/statistics.h"
 #include "session/technique_files.h"
 
@@ -63,7 +64,7 @@ void check(const RenderArguments& o) {
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the image needs a name");
     check_image_name("-o", o.output, ".exr");
     check_image_name("--png", o.png, ".png");
-    check_aovs(o.aovs);
+    check_aovs(o.aovs, "--");
     if (!o.techniques.empty()) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
@@ -88,13 +89,6 @@ void check(const RenderArguments& o) {
 size_t bytes_to_save(const Scene& scene) {
     constexpr size_t kPerPixel = 3 * (2 * sizeof(double) + 3 * sizeof(float)), kRest = 16 << 20;
     return size_t(scene.sensor.crop_width) * scene.sensor.crop_height * kPerPixel + kRest;
-}
-
-void check_aovs_of(const RenderArguments& o, const RenderSettings& settings) {
-    if (settings.sampler == Sampler::sobol && std::find(o.aovs.begin(), o.aovs.end(), "variance") != o.aovs.end())
-        throw Error(ExitCode::usage,
-                    "--aov variance: with sampler=sobol samples depend on each other, and their scatter is not the "
-                    "error of the mean; render several seeds");
 }
 
 void write_images(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
@@ -159,7 +153,7 @@ int render_by_ranges(const RenderArguments& o) {
     const LoadedScene loaded = load(o);
     ParallelRequest request;
     request.settings = o.render.settings(loaded.scene);
-    check_aovs_of(o, request.settings);
+    check_aovs_of(request.settings, o.aovs, "--");
     request.budget = render_budget(o.spp, o.time, loaded.scene, "--");
     expect(request.settings, request.budget);
     request.devices = o.devices;
@@ -217,14 +211,7 @@ Watched make_watched(const RenderArguments& o, const Scene& scene, const RenderS
     watched.invalid = invalid.get();
     watched.renderer = std::move(invalid);
     if (o.outliers == 0) return watched;
-    check_replay(used_settings(settings, watched.renderer->stats()));
-    if (const uint32_t together = watched.renderer->iteration_samples(); together > 1)
-        throw Error(
-            ExitCode::usage,
-            fmt::format("--outliers: this render adds {} samples of a pixel to the film at once (merge_samples); "
-                        "single ones are seen with merge_samples=1",
-                        together));
-    auto samples = std::make_unique<SampleWatch>(std::move(watched.renderer));
+    auto samples = watch_samples(std::move(watched.renderer), settings, "--");
     watched.samples = samples.get();
     watched.renderer = std::move(samples);
     return watched;
@@ -309,7 +296,7 @@ int render(const RenderArguments& o) {
     const LoadedScene loaded = load(o);
     const Scene& scene = loaded.scene;
     RenderSettings settings = o.render.settings(scene);
-    check_aovs_of(o, settings);
+    check_aovs_of(settings, o.aovs, "--");
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
     const Budget budget = render_budget(o.spp, o.time, scene, "--");
     expect(settings, budget);

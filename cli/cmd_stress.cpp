@@ -4,10 +4,8 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
-#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "stress/elsewhere.h"
 #include "stress/families.h"
 #include "stress/folder.h"
 #include "stress/runner.h"
@@ -48,14 +46,7 @@ int sweep(stress::Request& request) {
 /// Judges what another renderer measured.
 int judge(const StressArguments& o) {
     need_output(o.request.output, "--judge");
-    stress::Summary summary;
-    summary.rows = stress::judge_elsewhere(o.judge, stress::families());
-    summary.planned = summary.rows.size();
-    make_folders(o.request.output);
-    std::string text = stress::row_header() + "\n";
-    for (const stress::Row& row : summary.rows) text += stress::row_line(row) + "\n";
-    write_file_atomic(o.request.output + "/stress.csv", text);
-    std::cout << stress::report(summary) << std::flush;
+    std::cout << stress::report(stress::judge(o.judge, o.request.output, stress::families())) << std::flush;
     return int(ExitCode::done);
 }
 

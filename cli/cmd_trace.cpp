@@ -5,9 +5,9 @@
 
 #include "cli/commands.h"
 #include "core/error.h"
-#include "render/replay/by_length.h"
 #include "render/replay/print.h"
 #include "render/replay/replay.h"
+#include "session/replays.h"
 
 namespace ambilux {
 namespace {
@@ -41,13 +41,7 @@ void compare(const Scene& scene, const RenderSettings& settings, const ReplayReq
         compare_by_length(scene, settings, request, accels,
                           [&](const RenderSettings& s, uint32_t sample) { return rendered_film(scene, s, sample); });
     text += by_length_text(lengths);
-    nlohmann::json& list = json["by_segments"] = nlohmann::json::array();
-    for (const LengthComparison& c : lengths)
-        list.push_back({{"segments", c.segments},
-                        {"or_more", c.or_more},
-                        {"rendered", c.rendered},
-                        {"replayed", c.replayed},
-                        {"differs", c.differs}});
+    json["by_segments"] = by_length_json(lengths);
 }
 
 int trace(const TraceArguments& o) {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "backends/cuda_device.h"
 #include "core/outputs.h"
 #include "formats/load.h"
 #include "session/hooks.h"
@@ -29,9 +28,6 @@ void add_trace(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);
 void add_devices(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);
-
-/// What `ambilux devices` and `ambilux --version` say of devices, in lines.
-std::string devices_text(const CudaReport& report);
 
 /// Options that say which scene is meant.
 struct SceneOptions {

@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "integrators/registry.h"
 #include "render/replay/print.h"
+#include "session/replays.h"
 
 namespace ambilux {
 namespace {
@@ -63,17 +64,6 @@ std::string ends_of(const ReplayCandidate& c) {
     return c.eye_depth ? fmt::format("eye vertex {}, {}", c.eye_depth, light) : light;
 }
 
-nlohmann::json contribution_json(const ReplayCandidate& c) {
-    if (c.fate != ReplayFate::arrived && c.fate != ReplayFate::invalid) return nullptr;
-    if (c.kind[0] == '\0') return nullptr;
-    return {{"kind", c.kind},
-            {"strategy", strategy_text({c.strategy, c.merged})},
-            {"eye_depth", c.eye_depth},
-            {"light_depth", c.light_depth},
-            {"light_subpath", c.light_subpath == kNone ? nlohmann::json(nullptr) : nlohmann::json(c.light_subpath)},
-            {"contribution", {c.contribution.x, c.contribution.y, c.contribution.z}}};
-}
-
 void report_outlier(const Outlier& o, const std::string& command, std::string& text, nlohmann::json& list) {
     const WatchedPixel& p = o.pixel;
     text += fmt::format("pixel {},{} sample {}: ({:.6g}, {:.6g}, {:.6g}), {:.6g} above the mean of its other samples\n",
@@ -89,14 +79,8 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
             "  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1], o.replayed[2],
             o.complete ? ": paths parted; trace with --compare says where" : ", without connections from the cache");
     text += fmt::format("  {}\n", command);
-    list.push_back({{"pixel", {p.x, p.y}},
-                    {"sample", p.sample},
-                    {"value", {p.value[0], p.value[1], p.value[2]}},
-                    {"excess", p.excess},
-                    {"replayed", {o.replayed[0], o.replayed[1], o.replayed[2]}},
-                    {"complete", o.complete},
-                    {"largest", contribution_json(o.largest)},
-                    {"command", command}});
+    list.push_back(outlier_json(o));
+    list.back()["command"] = command;
 }
 
 void report_invalid(const InvalidRecord& r, const std::string& command, nlohmann::json& list) {

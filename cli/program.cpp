@@ -5,7 +5,6 @@
 #include <iostream>
 #include <new>
 
-#include "backends/cuda_device.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/manual.h"
@@ -13,6 +12,7 @@
 #include "core/log.h"
 #include "core/ranks.h"
 #include "core/version.h"
+#include "session/devices.h"
 
 namespace ambilux {
 namespace {

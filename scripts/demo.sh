@@ -5,7 +5,7 @@
 # CUDA kernels are built when a device is there, or with AMBILUX_CUDA=ON.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 has_all='import sys, importlib.util as u
-sys.exit(not all(map(u.find_spec, ("ambilux", "analysis", "scipy", "matplotlib", "OpenEXR", "PIL"))))'
+sys.exit(not all(map(u.find_spec, ("ambilux._core", "scipy", "matplotlib", "OpenEXR", "PIL"))))'
 installed=$(cd / && command -v python3 || true)
 if [[ -n $installed ]] && (cd / && "$installed" -c "$has_all") 2>/dev/null; then
   say "demo: with the installed package ambilux"
@@ -23,6 +23,6 @@ start=$SECONDS
 "${program[@]}" experiment experiments/demo.toml -o out/demo --resume
 say "demo: the experiment took $((SECONDS - start)) s"
 made=$SECONDS
-"$python" -m analysis out/demo -o out/demo
+"$python" -m ambilux.analysis out/demo -o out/demo
 say "demo: the report took $((SECONDS - made)) s"
 echo "report: $root/out/demo/report.html"

@@ -105,6 +105,8 @@ if [[ ! -x $python || ($made != "$(made_from requirements.txt requirements-tests
   fi
   made_from "${requirements[@]}" >"$stamp"
 fi
+# The package's sources, for `python -m ambilux.analysis`; a built or an installed package comes before them.
+for site in "$root"/.venv/lib/python3*/site-packages; do echo "$root/python" >"$site/ambilux-sources.pth"; done
 
 # The same places in which CMake looks (cmake/dependencies.cmake). CUDA is optional, and the run must not depend on a message.
 if ! command -v nvcc >/dev/null && [[ ! -x /usr/local/cuda/bin/nvcc && -z ${CUDACXX:-} ]]; then

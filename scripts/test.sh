@@ -23,12 +23,12 @@ status=0
 ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" \
   --output-junit "$results/ctest.xml" --test-output-size-passed 65536 "${selection[@]}" "$@" </dev/null || status=$?
 # Each suite of Python keeps one core busy.
-"$python" -m pytest -q -p no:cacheprovider analysis --junitxml "$results/pytest.xml" </dev/null >"$results/pytest.log" 2>&1 &
+"$python" -m pytest -q -p no:cacheprovider python/ambilux/analysis --junitxml "$results/pytest.xml" </dev/null >"$results/pytest.log" 2>&1 &
 analysis_tests=$!
 python_tests=()
 if [[ -d $build/python/ambilux ]]; then
   python_tests=("$results/python.xml")
-  PYTHONPATH="$build/python:$root" "$python" -m pytest -q -p no:cacheprovider python --junitxml "${python_tests[0]}" </dev/null ||
+  PYTHONPATH="$build/python" "$python" -m pytest -q -p no:cacheprovider python/tests --junitxml "${python_tests[0]}" </dev/null ||
     status=$?
 fi
 wait "$analysis_tests" || status=$?

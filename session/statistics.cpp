@@ -7,6 +7,7 @@
 #include "core/sha256.h"
 #include "core/version.h"
 #include "integrators/registry.h"
+#include "scene/info.h"
 
 namespace ambilux {
 namespace {
@@ -157,6 +158,23 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
                  {"selection", selection_json(stats.selection)},
                  {"version", version()},
                  {"git_revision", git_revision()}});
+    return json;
+}
+
+nlohmann::json info_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                         double load_seconds, const LoadTimes& times) {
+    nlohmann::json json = scene_info(scene);
+    json["kernels"] = {{"integrator", settings.integrator},
+                       {"variant", settings.variant},
+                       {"backend", stats.backend},
+                       {"device", stats.device},
+                       {"features", stats.features},
+                       {"skipped", stats.skipped},
+                       {"accel", stats.accel},
+                       {"memory", setting_text(settings, "memory")},
+                       {"memory_bytes", stats.memory_bytes}};
+    json["seconds"] = seconds_json(stats, load_seconds);
+    json["seconds"].update({{"read", times.read}, {"place", times.place}, {"finish", times.finish}});
     return json;
 }
 

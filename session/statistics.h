@@ -5,6 +5,7 @@
 #include <string>
 
 #include "film/exr_io.h"
+#include "formats/load.h"
 #include "render/renderer.h"
 
 namespace ambilux {
@@ -30,6 +31,11 @@ nlohmann::json seconds_json(const RenderStats& stats, double load_seconds);
 /// version and more.
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
                           double load_seconds);
+
+/// What is in the scene (scene/info.h), and under `kernels` and `seconds` what renders it: `stats` are those of its
+/// renderer, `times` the parts of `load_seconds`.
+nlohmann::json info_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                         double load_seconds, const LoadTimes& times);
 
 /// What every image file says about its making.
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats);

@@ -147,6 +147,12 @@ std::string row_line(const Row& row) {
     return line;
 }
 
+std::string rows_text(const std::vector<Row>& rows) {
+    std::string text = row_header() + "\n";
+    for (const Row& row : rows) text += row_line(row) + "\n";
+    return text;
+}
+
 std::optional<Row> parse_row(const std::string& line) {
     const std::vector<std::string> parts = split(line);
     Row row;

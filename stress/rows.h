@@ -36,6 +36,8 @@ void refuse_row(Row& row, const Cell& cell, const std::string& why);
 
 std::string row_header();
 std::string row_line(const Row& row);
+/// A file of them.
+std::string rows_text(const std::vector<Row>& rows);
 /// The row of a line that row_line made; nothing of another.
 std::optional<Row> parse_row(const std::string& line);
 

@@ -10,11 +10,13 @@
 #include <thread>
 
 #include "backends/cuda_device.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/progress.h"
 #include "integrators/reachability.h"
 #include "stress/deadline.h"
+#include "stress/elsewhere.h"
 #include "stress/folder.h"
 
 namespace ambilux::stress {
@@ -239,6 +241,15 @@ CellList chosen_cells(const std::vector<Family>& all, const std::vector<std::str
 
 Summary run(const Request& request, const std::vector<Family>& all, const Hooks& hooks) {
     return Sweep(request, all, hooks).run();
+}
+
+Summary judge(const std::string& table, const std::string& output, const std::vector<Family>& all) {
+    Summary summary;
+    summary.rows = judge_elsewhere(table, all);
+    summary.planned = summary.rows.size();
+    make_folders(output);
+    write_file_atomic(output + "/stress.csv", rows_text(summary.rows));
+    return summary;
 }
 
 }  // namespace ambilux::stress

@@ -41,6 +41,9 @@ std::vector<std::pair<const Family*, const Cell*>> chosen_cells(const std::vecto
 /// sweep already (without `resume`), bad_input if that was another one.
 Summary run(const Request& request, const std::vector<Family>& all, const Hooks& hooks);
 
+/// Judges what another renderer measured (stress/elsewhere.h), and writes stress.csv into the folder.
+Summary judge(const std::string& table, const std::string& output, const std::vector<Family>& all);
+
 /// Rows that are not ok, worst first, and how many of each verdict; for a person.
 std::string report(const Summary& summary);
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numbers
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
@@ -37,7 +37,7 @@ class Lines:
         self.paths.append(path)
 
 
-def fail(path: str, message: str) -> None:
+def fail(path: str, message: str) -> NoReturn:
     raise SceneError(f"{path or 'the dictionary'}: {message}", key=path)
 
 

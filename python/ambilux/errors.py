@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
+import warnings
+from collections.abc import Iterable
 
 
 class UsageError(ValueError):
@@ -30,3 +34,16 @@ class DeviceError(RuntimeError):
 
 class AmbiluxWarning(UserWarning):
     """What an image lacks or lost, and what was replaced in a scene."""
+
+
+class AmbiluxNote(AmbiluxWarning):
+    """What is done in another way than a scene says, with the same image, or with the one that it is known for."""
+
+
+def warn(texts: Iterable[str], kind: type[AmbiluxWarning] = AmbiluxWarning) -> None:
+    """As warnings of the line outside of this package that led here, so that Python says each once a line."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == os.path.dirname(__file__):
+        level, frame = level + 1, frame.f_back
+    for text in texts:
+        warnings.warn(text, kind, stacklevel=level)

@@ -16,13 +16,13 @@ from ambilux.errors import SceneError, UsageError
 
 
 class Results:
-    """The folder of an experiment. Each property is a frame of analysis.frames (needs pandas); columns: docs/experiments.md."""
+    """The folder of an experiment. Each property is a frame of ambilux.analysis.frames (needs pandas); columns: docs/experiments.md."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder)
 
     def _frame(self, name: str) -> Any:
-        from analysis import experiment, frames
+        from ambilux.analysis import experiment, frames
 
         try:
             return getattr(frames, name)(self.folder)
@@ -86,7 +86,8 @@ def config_file(config: str | os.PathLike[str] | Mapping[str, Any]) -> Iterator[
 def experiment(config: str | os.PathLike[str] | Mapping[str, Any], out: str | os.PathLike[str] | None = None, *, references: str | os.PathLike[str] = "",
                resume: bool = False, reduced: bool = False, quiet: bool = True, dry_run: bool = False) -> Results | str:
     """Runs an experiment as `ambilux experiment CONFIG -o OUT`; `config` is a file or a dictionary of the same keys. An interrupt saves what is finished;
-    `resume=True` goes on. With `dry_run` it says what would be done, and with which time and memory, and writes nothing."""
+    `resume=True` goes on. Raises SceneError for what is wrong with the configuration or a scene, with file and line.
+    With `dry_run` it says what would be done, and with which time and memory, and writes nothing."""
     with config_file(config) as path:
         if dry_run:
             return _core.plan(path, reduced)

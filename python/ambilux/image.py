@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 
 from ambilux import _core
 from ambilux.errors import UsageError
+from ambilux.records import Record
+from ambilux.replays import Outlier
 
 
 class DeviceArray:
@@ -52,6 +55,18 @@ class DeviceArray:
         return f"<ambilux.DeviceArray {self.shape[1]}x{self.shape[0]} on {self.device}>"
 
 
+@dataclass(frozen=True)
+class StrategyImage:
+    """What one strategy found, mean over all samples."""
+
+    s: int  #: vertices of the light subpath
+    t: int  #: vertices of the eye subpath
+    merge: bool  #: both subpaths end at one vertex, which s and t both count
+    raw: np.ndarray = field(repr=False)  #: float32 of height x width x 3, without the weight of multiple importance sampling
+    weighted: np.ndarray = field(repr=False)  #: with it: these of all strategies add up to the light of all paths up to technique_depth segments
+    dropped: int  #: values left out as not finite
+
+
 class Image:
     """Linear Rec.709 radiance: `rgb`, float32 of height x width x 3, row by row from the top left.
 
@@ -62,21 +77,26 @@ class Image:
     True
     """
 
-    def __init__(self, rgb: Any, stderr: Any = None, samples: int = 0, stats: dict[str, Any] | None = None, attributes: dict[str, Any] | None = None,
+    def __init__(self, rgb: Any, stderr: Any = None, samples: int = 0, stats: Record | None = None, attributes: dict[str, Any] | None = None,
                  on_device: DeviceArray | None = None):
         self.rgb = pixels(rgb)
         #: Standard error of every value; None where it is not known.
         self.stderr = None if stderr is None else pixels(stderr)
-        if stderr is not None and self.stderr.shape != self.rgb.shape:
+        if self.stderr is not None and self.stderr.shape != self.rgb.shape:
             raise UsageError(f"standard errors of shape {self.stderr.shape} do not belong to an image of {self.rgb.shape}")
         #: Per pixel; 0 if it is not known.
         self.samples = samples
         #: Of the render, as `ambilux render --json` writes them.
-        self.stats = stats or {}
+        self.stats: Record = stats or Record()
         #: What made the image, for the header of its file.
         self.attributes = attributes or {}
         #: The same values on the device that rendered them, where `device` asked for them; else None.
         self.on_device = on_device
+        #: One a strategy, where `technique_images` asked for them.
+        self.strategies: list[StrategyImage] = []
+        #: The largest first, where `outliers` asked for them.
+        self.outliers: list[Outlier] = []
+        self._layers: list[_core.Layer] = []
 
     @classmethod
     def _of(cls, core: _core.Pixels, **more: Any) -> Image:
@@ -88,7 +108,14 @@ class Image:
         return None if self.stderr is None else self.stderr**2 * np.float32(self.samples)
 
     @property
+    def aovs(self) -> dict[str, np.ndarray]:
+        """Layers that `aovs` asked for, by name: float32 of height x width, or of height x width x 3. Views, which keep the image's memory."""
+        arrays = {layer.name: layer.array(self.shape[0]) for layer in self._layers}
+        return {name: array[..., 0] if array.shape[2] == 1 else array for name, array in arrays.items()}
+
+    @property
     def shape(self) -> tuple[int, ...]:
+        """Height, width, 3."""
         return self.rgb.shape
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
@@ -113,7 +140,10 @@ class Image:
             return Path(folder, "image.png").read_bytes()
 
     def save(self, path: str | os.PathLike[str], *, exposure: float = 0.0, stderr: bool = False) -> None:
-        """Writes an EXR file, with `stderr` one that `compare` takes as reference, or a PNG `exposure` stops brighter."""
+        """Writes an EXR file with the layers of `aovs`, with `stderr` one without them that `compare` takes as reference, or a PNG `exposure` stops brighter.
+
+        Raises UsageError for another ending, DeviceError if the file cannot be written.
+        """
         name = os.fspath(path)
         os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
         if name.lower().endswith(".png"):
@@ -121,7 +151,7 @@ class Image:
         elif name.lower().endswith(".exr"):
             if stderr and self.stderr is None:
                 raise UsageError("the image has no standard errors")
-            _core.write_image(name, self.rgb, self.stderr if stderr else None, self.samples, json.dumps(self.attributes))
+            _core.write_image(name, self.rgb, self.stderr if stderr else None, self.samples, json.dumps(self.attributes), self._layers)
         else:
             raise UsageError(f"{name}: .exr and .png are known")
 
@@ -134,7 +164,7 @@ def pixels(value: Any) -> np.ndarray:
 
 
 def read(path: str | os.PathLike[str]) -> Image:
-    """Reads an EXR file; a reference with its standard errors."""
+    """Reads an EXR file; a reference with its standard errors. float32 of height x width x 3. Raises SceneError that names the file and what is wrong with it."""
     core, attributes = _core.read_image(os.fspath(path))
     stated = json.loads(attributes)
     image = Image(core.rgb, core.stderr, core.samples, attributes=stated)
@@ -154,7 +184,8 @@ def as_image(value: Any) -> Image:
 def compare(image: Any, reference: Any) -> dict[str, float | None]:
     """Error of an image against a reference: the figures of `ambilux compare --json`, None where they are not known.
 
-    Both may be images, arrays or names of EXR files. Do not take images of equal seeds: what they share is no error of either.
+    Both may be images, arrays of height x width x 3 or names of EXR files. RMSE and bias have the unit of the images, relMSE and MAPE none; `bias_z` counts standard
+    errors (docs/experiments.md). Do not take images of equal seeds: what they share is no error of either. Raises UsageError for different sizes.
 
     >>> one, other = (ambilux.render(scene, spp=4, seed=seed) for seed in (1, 2))
     >>> metrics = ambilux.compare(one, other)
@@ -164,4 +195,5 @@ def compare(image: Any, reference: Any) -> dict[str, float | None]:
     one, other = as_image(image), as_image(reference)
     if one.shape != other.shape:
         raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}: render both at the same size")
-    return json.loads(_core.compare(one.rgb, other.rgb, other.stderr, other.samples))
+    metrics: dict[str, float | None] = json.loads(_core.compare(one.rgb, other.rgb, other.stderr, other.samples))
+    return metrics

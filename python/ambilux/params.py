@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def unit_of(name: str) -> str:
     return UNITS.get(last, UNITS["reflectance"] if last.endswith(("reflectance", "transmittance")) else "")
 
 
-def fail(name: str, message: str) -> None:
+def fail(name: str, message: str) -> NoReturn:
     raise SceneError(f"{name}: {message}", key=name)
 
 
@@ -102,7 +102,8 @@ class Params(Mapping[str, Any]):
         """Changes as the core takes them."""
         if not isinstance(changes, Mapping):
             raise SceneError(f"{changes!r}: a dictionary is needed, such as {{'lamp.radiance': 2}}", key="with_params")
-        edits, meshes = [], {}
+        edits: list[_core.Edit] = []
+        meshes: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
             name = str(name)
             if name not in self._entries and name.endswith(".value") and name[:-6] in self._entries:
@@ -125,7 +126,7 @@ def array_edits(lines: dictionary.Lines) -> list[_core.Edit]:
             *(image_edit(name, f"{name}.data", value) for name, value in lines.images.items())]
 
 
-def refuse(name: str, kind: str, given: str) -> None:
+def refuse(name: str, kind: str, given: str) -> NoReturn:
     unit = unit_of(name)
     fail(name, f"{WANTED[kind]} is needed{f' ({unit})' if unit else ''}, not {given}")
 

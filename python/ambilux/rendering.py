@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import numbers
 import os
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ambilux import _core
-from ambilux.errors import AmbiluxWarning, UsageError
-from ambilux.image import DeviceArray, Image
+from ambilux.errors import UsageError, warn
+from ambilux.image import DeviceArray, Image, StrategyImage
+from ambilux.records import Record, record
+from ambilux.replays import outliers_of
 from ambilux.scene import Scene, checked_size, load, setting_text
 
 
@@ -30,21 +31,24 @@ def assignments(settings: Mapping[str, Any] | None, **named: Any) -> list[tuple[
     return [(str(k), setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
 
 
-def count(name: str, value: int | None) -> int | None:
-    if value is None:
-        return None
+def count(name: str, value: int) -> int:
     if not isinstance(value, numbers.Real) or isinstance(value, bool) or value != value // 1 or not 0 <= value < 2**64:
         raise UsageError(f"{name} {value}: a whole number that is not negative, below 2**64, is needed")
     return int(value)
 
 
-def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, settings: Mapping[str, Any] | None, spp: int | None, time: float | None,
-          **named: Any) -> _core.Render:
+def names(what: str, values: Sequence[str]) -> list[str]:
+    if isinstance(values, str):
+        raise UsageError(f"{what} {values!r}: a list of names is needed, such as [{values!r}]")
+    return list(values)
+
+
+def begin(scene: Scene, settings: Mapping[str, Any] | None, spp: int | None, time: float | None, extras: Mapping[str, Any] = {}, **named: Any) -> _core.Render:
+    """`extras`: what the render is to have besides its image."""
     if not isinstance(time, (numbers.Real, type(None))):
         raise UsageError(f"time {time!r}: seconds are needed")
-    core = _core.Render(scene_of(scene, size)._core, assignments(settings, **named), count("spp", spp), time)
-    for text in core.warnings:
-        warnings.warn(text, AmbiluxWarning, stacklevel=4)
+    core = _core.Render(scene._core, assignments(settings, **named), None if spp is None else count("spp", spp), time, **extras)
+    warn(core.warnings)
     return core
 
 
@@ -61,31 +65,52 @@ def backend_of(device: str | None, backend: str | None, settings: Mapping[str, A
 
 def finished(core: _core.Render, device: str | None) -> Image:
     if lost := core.lost():
-        warnings.warn(lost, AmbiluxWarning, stacklevel=3)
+        warn([lost])
     return image_of(core, device)
 
 
 def image_of(core: _core.Render, device: str | None) -> Image:
-    on_device = DeviceArray(core.device_image()) if device == "cuda" else None
-    return Image._of(core.pixels(), stats=json.loads(core.stats()), attributes=json.loads(core.attributes()), on_device=on_device)
+    array = core.device_image() if device == "cuda" else None
+    on_device = None if array is None else DeviceArray(array)
+    return Image._of(core.pixels(), stats=record(core.stats()), attributes=json.loads(core.attributes()), on_device=on_device)
 
 
 def render(scene: Scene | str | os.PathLike[str], integrator: str | None = None, variant: str | None = None, *, spp: int | None = None, time: float | None = None,
            seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
-           device: str | None = None, settings: Mapping[str, Any] | None = None) -> Image:
+           device: str | None = None, settings: Mapping[str, Any] | None = None, aovs: Sequence[str] = (),
+           technique_images: bool | str | os.PathLike[str] = False, outliers: int = 0) -> Image:
     """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for, and without `integrator` by the scene's.
 
     With device="cuda" the image is on the device as well, as `image.on_device`. `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
-    after the sample per pixel in work.
+    after the sample per pixel in work. Raises UsageError for values that are not allowed, DeviceError where the device or its memory fails.
+
+    `aovs` names layers, which become `image.aovs`: albedo, normal, depth, position, samples, variance (docs/aovs.md). With `technique_images` there are images of
+    all strategies in `image.strategies`, and as files in the folder of that name, if it is one. `outliers` pixels are in `image.outliers`, those whose largest
+    sample exceeds the mean of their others most.
 
     >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
     (2, 'bdpt', True)
+    >>> image = ambilux.render(scene, "bdpt", spp=2, aovs=["depth", "normal"], technique_images=True, outliers=1)
+    >>> image.aovs["normal"].shape, image.strategies[0].raw.shape, len(image.outliers)
+    ((24, 32, 3), (24, 32, 3), 1)
     """
     backend = backend_of(device, backend, settings)
-    core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
+    most = count("outliers", outliers)
+    if most and device == "cuda":
+        raise UsageError("outliers: samples are looked at one by one on the host; leave device='cuda' out, and take backend='cuda'")
+    loaded = scene_of(scene, size)
+    extras = {"aovs": names("aovs", aovs), "technique_images": bool(technique_images), "outliers": most > 0}
+    core = begin(loaded, settings, spp, time, extras, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
     core.advance(0)
-    return finished(core, device)
+    image = finished(core, device)
+    image._layers = core.layers() if aovs else []
+    if technique_images:
+        image.strategies = [StrategyImage(*values) for values in core.strategies()]
+        if not isinstance(technique_images, bool):
+            core.write_techniques(os.fspath(technique_images))
+    image.outliers = outliers_of(loaded._core, core, most)
+    return image
 
 
 @dataclass(frozen=True)
@@ -97,7 +122,7 @@ class Step:
     seconds: float  #: of wall clock inside the renderer
 
     @property
-    def stats(self) -> dict[str, Any]:
+    def stats(self) -> Record:
         return self.image.stats
 
     @property
@@ -108,7 +133,7 @@ class Step:
 def progressive(scene: Scene | str | os.PathLike[str], integrator: str | None = None, variant: str | None = None, *, spp: int | None = None,
                 time: float | None = None, every: float = 0.5, seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None,
                 backend: str | None = None, device: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
-    """The same render, with the image so far about `every` seconds and at the end.
+    """The same render, with the image so far about `every` seconds of rendering and at the end. Raises as `render` does.
 
     >>> steps = list(ambilux.progressive(scene, spp=64, every=0.01))
     >>> steps[-1].samples, all(a.samples < b.samples for a, b in zip(steps, steps[1:]))
@@ -117,7 +142,7 @@ def progressive(scene: Scene | str | os.PathLike[str], integrator: str | None = 
     if not isinstance(every, numbers.Real) or not every > 0:
         raise UsageError(f"every {every}: more than zero seconds are needed")
     backend = backend_of(device, backend, settings)
-    core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
+    core = begin(scene_of(scene, size), settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
     return steps_of(core, every, device)
 
 
@@ -134,7 +159,11 @@ def steps_of(core: _core.Render, every: float, device: str | None) -> Iterator[S
 def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str], *, spp: int, seed: int | None = None,
               size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
               settings: Mapping[str, Any] | None = None) -> Image:
-    """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
+    """Ground truth with its standard error, in the EXR file at `path`, which is continued if it exists. An interrupt saves what is finished.
+
+    `spp` is of the whole reference, at least 2. The path tracer makes it unless `settings` names another integrator. Raises SceneError if the file is of another scene,
+    size, seed or method, UsageError for settings that a reference cannot have.
+    """
     if os.fspath(path).lower().endswith(".png"):
         raise UsageError(f"{os.fspath(path)}: a reference is an EXR file, whose name ends in .exr")
     core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import operator
 import os
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 from ambilux import _core, dictionary
 from ambilux.arrays import numbers_of, plain
-from ambilux.errors import AmbiluxWarning, SceneError, UsageError
+from ambilux.errors import AmbiluxNote, SceneError, UsageError, warn
 from ambilux.params import Params, array_edits, unit_of
+from ambilux.records import Record, record
 
 
 def checked_size(size: tuple[int, int] | None) -> tuple[int, int]:
@@ -65,15 +64,16 @@ class Scene:
                           [f"{k}={v}" for k, v in (limits or {}).items()], edits or [])
         self._take(core)
 
-    def _take(self, core: _core.Scene) -> None:
+    def _take(self, core: _core.Scene, said: frozenset[str] = frozenset()) -> None:
+        """`said`: what the scene that this one was made from was warned of already."""
         self._core = core
         self._params: Params | None = None
-        for text in core.warnings:
-            warnings.warn(text, AmbiluxWarning, stacklevel=5)
+        warn(text for text in core.warnings if text not in said)
+        warn((text for text in core.notes if text not in said), AmbiluxNote)
 
     def _edited(self, edits: list[_core.Edit], size: tuple[int, int] | None = None) -> Scene:
         other = Scene.__new__(Scene)
-        other._take(self._core.edited(edits, checked_size(size)))
+        other._take(self._core.edited(edits, checked_size(size)), frozenset([*self._core.warnings, *self._core.notes]))
         return other
 
     @property
@@ -91,9 +91,9 @@ class Scene:
         return self._core.hash
 
     @property
-    def info(self) -> dict[str, Any]:
-        """What is in the scene, as `ambilux info --json`."""
-        return json.loads(self._core.info())
+    def info(self) -> Record:
+        """What is in the scene: shapes, materials and emitters by type, triangles, bytes, sensor, film. `ambilux.info` says what renders it too."""
+        return record(self._core.info())
 
     def resized(self, size: tuple[int, int]) -> Scene:
         """The same scene with an image of another size.
@@ -172,7 +172,8 @@ class Scene:
         return dictionary.from_xml(self._core.text(""), self._core)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the scene as Mitsuba's XML; arrays become files in a folder beside it. What another format described is written by `ambilux convert`."""
+        """Writes the scene as Mitsuba's XML; arrays become files in a folder beside it. What another format described is written by
+        `ambilux.convert`. Raises UsageError for another ending, DeviceError if files cannot be written."""
         name = os.fspath(path)
         if not name.lower().endswith(".xml"):
             raise UsageError(f"{name}: scenes are written as .xml")
@@ -186,7 +187,8 @@ class Scene:
 def load(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None, lenient: bool = False, light_picking: str = "power",
          limits: Mapping[str, int | str] | None = None, **defines: Any) -> Scene:
     """Reads a scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb). `defines` are values of $parameters of Mitsuba scenes; the others are options
-    of `ambilux render`.
+    of `ambilux render`; `size` is (width, height) in pixels, `limits` as in docs/limits.md. Raises SceneError with `file` and `line`. What is replaced or done in another way
+    is a warning (AmbiluxWarning, AmbiluxNote).
 
     >>> ambilux.load(SCENES / "cornell.xml", resx=40, resy=30).size
     (40, 30)

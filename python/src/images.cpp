@@ -1,8 +1,8 @@
 // Images as arrays that NumPy sees without a copy, their files, and their comparison.
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
 #include <optional>
@@ -41,12 +41,12 @@ std::pair<Reference, std::string> read_image(const std::string& path) {
 }
 
 void write_image(const std::string& path, const PixelsIn& rgb, std::optional<PixelsIn> standard_error, uint64_t samples,
-                 const std::string& attributes) {
+                 const std::string& attributes, const std::vector<Layer>& layers) {
     const Attributes stated = nlohmann::json::parse(attributes);
     if (standard_error)
         write_reference_exr(path, {copied(rgb), copied(*standard_error), samples}, stated);
     else
-        write_exr(path, copied(rgb), stated);
+        write_exr(path, copied(rgb), stated, layers);
 }
 
 std::string compare(const PixelsIn& image, const PixelsIn& mean, std::optional<PixelsIn> standard_error,
@@ -72,6 +72,17 @@ void bind_images(nb::module_& m) {
             },
             nb::rv_policy::reference)
         .def_ro("samples", &Reference::samples);
+    nb::class_<Layer>(m, "Layer", "Values of pixels beside the image.")
+        .def_ro("name", &Layer::name)
+        .def_ro("channels", &Layer::channels)
+        .def(
+            "array",
+            [](nb::handle_t<Layer> self, size_t height) {
+                auto& layer = nb::cast<Layer&>(self);
+                const size_t channels = layer.channels.size(), width = layer.values.size() / channels / height;
+                return Pixels(layer.values.data(), {height, width, channels}, self);
+            },
+            nb::rv_policy::reference, "height"_a, "A view of height x width x channels.");
     nb::class_<DeviceImage>(m, "DeviceImage", "Means of pixels in the memory of a CUDA device.")
         .def_ro("device", &DeviceImage::device)
         .def_prop_ro("size", [](const DeviceImage& i) { return std::pair(i.width, i.height); })
@@ -86,8 +97,8 @@ void bind_images(nb::module_& m) {
             nb::rv_policy::reference, nb::sig("def dlpack(self) -> object"),
             "A capsule of DLPack, which keeps the memory.");
     m.def("read_image", &read_image, "path"_a, "Pixels of an EXR file, and its attributes.");
-    m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a,
-          "Writes an EXR file: a reference if `stderr` is given.");
+    m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a, "layers"_a,
+          "Writes an EXR file: a reference if `stderr` is given, which has no layers.");
     m.def(
         "write_png",
         [](const std::string& path, const PixelsIn& rgb, float exposure) { write_png(path, copied(rgb), exposure); },

@@ -8,6 +8,7 @@
 
 #include "accel/shared_accels.h"
 #include "formats/edits.h"
+#include "integrators/settings.h"
 
 namespace ambilux {
 
@@ -21,7 +22,11 @@ struct LoadedScene {
         std::make_shared<Structures>();  ///< shared with scenes that they serve too
     std::vector<std::string> files;
     double seconds = 0;
+    LoadTimes times;  ///< parts of them
 };
 using SharedScene = std::shared_ptr<LoadedScene>;
+
+/// What the scene asks for, and these.
+RenderSettings settings_of(const Scene& scene, const Assignments& assignments);
 
 }  // namespace ambilux

@@ -91,7 +91,7 @@ void run_unlocked(const std::function<void(const volatile bool* interrupt)>& wor
 NB_MODULE(_core, m) {
     using namespace ambilux;
     nb::register_exception_translator(translate);
-    m.attr("__version__") = version();
+    m.attr("version") = version();
     m.attr("git_revision") = git_revision();
     m.def("cuda_available", &cuda_available, "True if this build has the CUDA backend and a device answers.");
     m.def("settings_help", &settings_help, "All settings and variants, as `ambilux help settings`.");
@@ -102,4 +102,6 @@ NB_MODULE(_core, m) {
     bind_images(m);
     bind_scenes(m);
     bind_renders(m);
+    bind_replays(m);
+    bind_commands(m);
 }

@@ -10,7 +10,6 @@
 #include <memory>
 
 #include "core/error.h"
-#include "core/log.h"
 #include "core/outputs.h"
 #include "experiments/dry_run.h"
 #include "experiments/reference_store.h"
@@ -19,14 +18,16 @@
 #include "python/src/bindings.h"
 #include "python/src/loaded_scene.h"
 #include "render/shared_renderer.h"
+#include "session/aovs.h"
 #include "session/render_plan.h"
+#include "session/replays.h"
 #include "session/statistics.h"
+#include "session/technique_files.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace ambilux {
-namespace {
 
 RenderSettings settings_of(const Scene& scene, const Assignments& assignments) {
     RenderSettings settings = default_settings(scene);
@@ -34,22 +35,45 @@ RenderSettings settings_of(const Scene& scene, const Assignments& assignments) {
     return settings;
 }
 
+namespace {
+
+/// What a render is to have besides its image.
+struct Extras {
+    std::vector<std::string> aovs;
+    bool technique_images = false, outliers = false;
+};
+
 /// A render that goes on step by step.
 class Render {
 public:
-    Render(SharedScene scene, const Assignments& assignments, std::optional<uint64_t> spp, std::optional<double> time)
+    Render(SharedScene scene, const Assignments& assignments, std::optional<uint64_t> spp, std::optional<double> time,
+           const Extras& extras)
         : scene_(std::move(scene)), settings_(settings_of(scene_->scene, assignments)),
-          budget_(render_budget(spp, time, scene_->scene, "")) {
+          budget_(render_budget(spp, time, scene_->scene, "")), aovs_(extras.aovs) {
+        check_aovs(aovs_, "");
+        check_aovs_of(settings_, aovs_, "");
+        if (extras.technique_images && settings_.technique_depth == 0)
+            settings_.technique_depth = kDefaultTechniqueDepth;
         expect(settings_, budget_);
         run_unlocked([&](const volatile bool*) {
             SharedAccels accels(scene_->scene, scene_->structures);
             renderer_ = make_renderer(scene_->scene, settings_, accels);
         });
+        if (extras.outliers) {
+            auto watched = watch_samples(std::move(renderer_), settings_, "");
+            watch_ = watched.get();
+            renderer_ = std::move(watched);
+        }
         position_ = first_position(*renderer_);
     }
 
-    std::vector<std::string> warnings() const {
-        return render_warnings(scene_->scene, used_settings(settings_, renderer_->stats()));
+    std::vector<std::string> warnings() const { return render_warnings(scene_->scene, used()); }
+    /// All settings of the samples that were rendered.
+    RenderSettings used() const {
+        const RenderStats stats = renderer_->stats();
+        RenderSettings used = used_settings(settings_, stats);
+        apply_setting(used, "backend", stats.backend);
+        return used;
     }
 
     /// Renders for about `seconds`, or with 0 to the end. Returns false at the end.
@@ -94,6 +118,34 @@ public:
         run_unlocked([&](const volatile bool*) { image = renderer_->device_image(); });
         return image;
     }
+    std::vector<Layer> layers() {
+        std::vector<Layer> layers;
+        run_unlocked(
+            [&](const volatile bool*) { layers = make_aovs(scene_->scene, settings_, renderer_->film(), aovs_); });
+        return layers;
+    }
+    std::string outliers(uint32_t count) const {
+        nlohmann::json list = nlohmann::json::array();
+        run_unlocked([&](const volatile bool*) {
+            SharedAccels accels(scene_->scene, scene_->structures);
+            const std::unique_ptr<Replay> replay = make_replay(scene_->scene, used(), accels);
+            for (const Outlier& o : find_outliers(*watch_, *replay, count)) list.push_back(outlier_json(o));
+        });
+        return json_text({{"outliers", list}});
+    }
+    /// s, t, merge, raw, weighted, dropped.
+    nb::list strategies() {
+        nb::list list;
+        const Sensor& sensor = scene_->scene.sensor;
+        const std::vector<size_t> shape = {sensor.crop_height, sensor.crop_width, 3};
+        for (const StrategyImage& i : renderer_->strategy_images())
+            list.append(nb::make_tuple(i.s, i.t, i.merge, array_of<float>(i.raw, shape),
+                                       array_of<float>(i.weighted, shape), i.dropped));
+        return list;
+    }
+    void write_techniques(const std::string& folder) {
+        write_technique_images(folder, scene_->scene, settings_, renderer_->stats(), renderer_->strategy_images());
+    }
     uint64_t samples() const { return position_.samples; }
     double seconds() const { return position_.seconds; }
     std::string stats() const {
@@ -106,7 +158,9 @@ private:
     SharedScene scene_;
     RenderSettings settings_;
     Budget budget_;
+    std::vector<std::string> aovs_;
     std::unique_ptr<Renderer> renderer_;
+    const SampleWatch* watch_ = nullptr;  ///< with outliers
     RenderPosition position_;
 };
 
@@ -141,33 +195,32 @@ std::string plan(const std::string& config, bool reduced) {
 
 void experiment(const std::string& config, const std::string& output, const std::string& references, bool resume,
                 bool reduced, bool quiet) {
-    const bool before = is_quiet();
-    set_quiet(quiet);
+    const QuietFor silence(quiet);
     ExperimentRequest request;
     request.config = config;
     request.output = output;
     request.references = references;
     request.resume = resume;
     request.reduced = reduced;
-    const auto restore = [&] { set_quiet(before); };
-    try {
-        run_unlocked([&](const volatile bool* interrupt) {
-            request.interrupt = interrupt;
-            run_experiment(request, default_hooks());
-        });
-    } catch (...) {
-        restore();
-        throw;
-    }
-    restore();
+    run_unlocked([&](const volatile bool* interrupt) {
+        request.interrupt = interrupt;
+        run_experiment(request, default_hooks());
+    });
 }
 
 }  // namespace
 
 void bind_renders(nb::module_& m) {
     nb::class_<Render>(m, "Render")
-        .def(nb::init<SharedScene, const Assignments&, std::optional<uint64_t>, std::optional<double>>(), "scene"_a,
-             "settings"_a, "spp"_a.none(), "time"_a.none())
+        .def(
+            "__init__",
+            [](Render* render, SharedScene scene, const Assignments& settings, std::optional<uint64_t> spp,
+               std::optional<double> time, std::vector<std::string> aovs, bool technique_images, bool outliers) {
+                new (render)
+                    Render(std::move(scene), settings, spp, time, {std::move(aovs), technique_images, outliers});
+            },
+            "scene"_a, "settings"_a, "spp"_a.none(), "time"_a.none(), "aovs"_a = std::vector<std::string>(),
+            "technique_images"_a = false, "outliers"_a = false)
         .def("advance", &Render::advance, "seconds"_a)
         .def("add", &Render::add, "first"_a, "count"_a)
         .def("clear", &Render::clear)
@@ -176,6 +229,11 @@ void bind_renders(nb::module_& m) {
         .def("stats", &Render::stats)
         .def("attributes", &Render::attributes)
         .def("lost", &Render::lost)
+        .def("used", &Render::used)
+        .def("layers", &Render::layers)
+        .def("outliers", &Render::outliers, "count"_a)
+        .def("strategies", &Render::strategies)
+        .def("write_techniques", &Render::write_techniques, "folder"_a)
         .def_prop_ro("warnings", &Render::warnings)
         .def_prop_ro("samples", &Render::samples)
         .def_prop_ro("seconds", &Render::seconds);

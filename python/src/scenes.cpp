@@ -1,5 +1,4 @@
 // Scenes: from files and texts, changed, and as files again.
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -59,14 +58,6 @@ Edit image_edit(const std::string& name, const TexelsIn<T>& texels) {
     return {name, "", nullptr, std::make_shared<const Texels>(std::move(image))};
 }
 
-/// An array that owns a copy of the values.
-template <class T, class From>
-nb::ndarray<nb::numpy, T, nb::c_contig> array_of(const std::vector<From>& values, std::vector<size_t> shape) {
-    auto* held = new std::vector<From>(values);
-    const nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<From>*>(p); });
-    return {reinterpret_cast<T*>(held->data()), shape.size(), shape.data(), owner};
-}
-
 nb::dict mesh_arrays(const LoadedScene& scene, const std::string& name) {
     const Mesh mesh = mesh_of(scene.editable, name);
     nb::dict out;
@@ -92,6 +83,7 @@ void make(LoadedScene& loaded, std::vector<Edit> edits, const std::function<Scen
     options.edits = std::move(edits);
     options.files = &loaded.files;
     options.editable = &loaded.editable;
+    options.times = &loaded.times;
     run_unlocked([&](const volatile bool*) {
         const auto start = std::chrono::steady_clock::now();
         loaded.scene = scene_of(options);
@@ -148,6 +140,7 @@ void bind_scenes(nb::module_& m) {
             "size",
             [](const LoadedScene& s) { return std::pair(s.scene.sensor.crop_width, s.scene.sensor.crop_height); })
         .def_prop_ro("warnings", [](const LoadedScene& s) { return s.scene.warnings; })
+        .def_prop_ro("notes", [](const LoadedScene& s) { return s.scene.notes; })
         .def_prop_ro("hash", [](const LoadedScene& s) { return scene_hash(s.scene); })
         .def_ro("seconds", &LoadedScene::seconds)
         .def("info", [](const LoadedScene& s) { return json_text(scene_info(s.scene)); })
@@ -161,7 +154,7 @@ void bind_scenes(nb::module_& m) {
         .def("text", [](const LoadedScene& s, const std::string& path) { return scene_text(s.editable, path); })
         .def("write", [](const LoadedScene& s, const std::string& path) { write_scene(s.editable, path); });
     m.def("load", &load, "path"_a, "text"_a.none(), "parameters"_a, "size"_a, "lenient"_a, "uniform_picking"_a,
-          "limits"_a, "edits"_a);
+          "limits"_a, "edits"_a = std::vector<Edit>());
 }
 
 }  // namespace ambilux

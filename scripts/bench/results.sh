@@ -31,7 +31,7 @@ case $step in
     say "$3: $(du -h "$3" | cut -f1)"
     ;;
   page)
-    for e in "${experiments[@]}"; do "$python" -m analysis "$folder/$e" -o "$folder/$e/figures" || say "$e: not all figures were made"; done
+    for e in "${experiments[@]}"; do "$python" -m ambilux.analysis "$folder/$e" -o "$folder/$e/figures" || say "$e: not all figures were made"; done
     "$python" scripts/bench/results_page.py "$folder" docs/results.md docs/images/results
     ;;
   *) usage ;;

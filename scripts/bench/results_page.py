@@ -8,8 +8,8 @@ import shutil
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from analysis import captions, experiment, flip_maps, remarks, summary, tables, verdicts
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
+from ambilux.analysis import captions, experiment, flip_maps, remarks, summary, tables, verdicts
 
 FIGURES = {"results": ("overview", "convergence_time_relmse", "convergence_spp", "stage_times", "comparison_glass"), "results_switches": ("ablation",)}
 # Untrimmed errors and equal time lead.

@@ -5,7 +5,7 @@ Usage: scripts/bench/tile_bound.py measure OUT.npz SCENE WxH [--seconds 2.5] [--
 `measure` renders every candidate twice, each for so many CPU seconds, and crops of the film for what a tile costs
 (`--group 2`: crops of 2x2 tiles, for scenes that take long to load). Start it with `taskset -c N`, one thread each.
 `table` chooses on one render and scores on the other, both ways. Figures are 1/(relMSE time) over the best single
-candidate with the same number of eye samples in all pixels. `measure` needs PYTHONPATH=build-cpu/python:.
+candidate with the same number of eye samples in all pixels. `measure` needs PYTHONPATH=build-cpu/python.
 """
 
 import argparse

@@ -14,6 +14,7 @@ Exit status: 0 if all of it holds, 1 if not.
 
 import argparse
 import csv
+import os
 import random
 import shutil
 import signal
@@ -25,8 +26,9 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-from analysis.images import read_exr  # noqa: E402
+sys.path.insert(0, str(ROOT / "python"))
+os.environ["PYTHONPATH"] = str(ROOT / "python")  # of the analyses that it starts
+from ambilux.analysis.images import read_exr  # noqa: E402
 
 SIGNALS = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP]
 IN_A_ROW = 5
@@ -116,7 +118,7 @@ class Analysis:
         self.results = results
 
     def command(self, program, folder):
-        return [sys.executable, "-m", "analysis", self.results, "-o", folder / "report"]
+        return [sys.executable, "-m", "ambilux.analysis", self.results, "-o", folder / "report"]
 
     def progress(self, folder, _):
         return 0

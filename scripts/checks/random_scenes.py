@@ -21,10 +21,10 @@ import numpy as np
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "scripts" / "peers"), str(ROOT)]
+sys.path[:0] = [str(ROOT / "scripts" / "peers"), str(ROOT / "python")]
 import plugin_scenes
 import plugins
-from analysis.images import read_exr
+from ambilux.analysis.images import read_exr
 from random_scene import RandomScene
 
 BLOCK_BOUND, IMAGE_BOUND = 4.7, 4.2

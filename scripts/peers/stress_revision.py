@@ -5,7 +5,7 @@ stress --judge` reads.
     ambilux stress --export scenes
     scripts/peers/stress_revision.py earlier/build/cli/ambilux scenes earlier.csv --jobs 16
     ambilux stress --judge earlier.csv -o earlier
-    python -m analysis.stress out/stress -o figures --before earlier
+    python -m ambilux.analysis.stress out/stress -o figures --before earlier
 
 Each batch is a render of its own with a seed of its own, on a core of its own. Lines that are there already are not made again.
 """

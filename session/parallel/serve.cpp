@@ -13,12 +13,12 @@ namespace ambilux {
 namespace {
 
 /// Looks for messages: while an order is waited for, and else. A look costs a core 25 us.
-constexpr double kPollSeconds = 2e-3, kBusyPollSeconds = 10e-3;
+constexpr double kServePollSeconds = 2e-3, kBusyPollSeconds = 10e-3;
 
 Told wait_for_setup(Ranks& ranks) {
     for (;;) {
         if (std::optional<Told> told = hear(ranks)) return std::move(*told);
-        std::this_thread::sleep_for(std::chrono::duration<double>(kPollSeconds));
+        std::this_thread::sleep_for(std::chrono::duration<double>(kServePollSeconds));
     }
 }
 
@@ -81,10 +81,10 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
             if (crew) crew->give(read_order(told->text));
         }
         if (!crew) {
-            std::this_thread::sleep_for(std::chrono::duration<double>(kPollSeconds));
+            std::this_thread::sleep_for(std::chrono::duration<double>(kServePollSeconds));
             continue;
         }
-        const std::vector<Finished> finished = crew->take(asked ? kPollSeconds : kBusyPollSeconds);
+        const std::vector<Finished> finished = crew->take(asked ? kServePollSeconds : kBusyPollSeconds);
         // Before its last film: the render ends when no film is missing.
         if (const size_t ranges = asked ? 0 : crew->wanted()) {
             tell(ranks, 0, Say::wanted, {{"ranges", ranges}});
