@@ -4,32 +4,11 @@
 #include <string>
 
 #include "accel/embree_api.h"
+#include "accel/split_bounds.h"
 #include "core/error.h"
 #include "core/parallel.h"
 
 namespace ambilux {
-
-void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position,
-                           Bounds3f& left, Bounds3f& right) {
-    const Triangle tri = scene.triangles[prim];
-    const Vec3f v[3] = {scene.vertices[tri.v0].p, scene.vertices[tri.v1].p, scene.vertices[tri.v2].p};
-    left = right = {};
-    for (int i = 0; i < 3; ++i) {
-        const Vec3f a = v[i], b = v[(i + 1) % 3];
-        if (a[axis] <= position) left.extend(a);
-        if (a[axis] >= position) right.extend(a);
-        if ((a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position)) {
-            const Vec3f c = a + (b - a) * ((position - a[axis]) / (b[axis] - a[axis]));
-            const Vec3f pad = max(abs(a), abs(b)) * gamma_bound(6);
-            left.extend(c - pad), left.extend(c + pad);
-            right.extend(c - pad), right.extend(c + pad);
-        }
-    }
-    left.upper[axis] = min(left.upper[axis], position);
-    right.lower[axis] = max(right.lower[axis], position);
-    left.lower = max(left.lower, within.lower), left.upper = min(left.upper, within.upper);
-    right.lower = max(right.lower, within.lower), right.upper = min(right.upper, within.upper);
-}
 
 namespace {
 
@@ -134,19 +113,10 @@ std::vector<RTCBuildPrimitive> primitives_of(const SceneView& scene, const Group
     primitives.reserve(size_t(count - first) * 2);
     for (uint32_t i = first; i < count; ++i) {
         if (!group && scene.group_count && i >= scene.ungrouped_count() && i < scene.triangle_count) continue;
-        const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i)
-                           : scene.is_instanced(i)
+        const Bounds3f b = scene.is_instanced(i)
                                ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
-                               : quadric_bounds(scene.quadric(i));
-        if (b.empty()) continue;
-        // min and max skip NaN, so a triangle's vertices are looked at themselves.
-        bool finite = is_finite(b.lower) && is_finite(b.upper);
-        if (scene.is_triangle(i)) {
-            const Triangle t = scene.triangles[i];
-            finite = is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) &&
-                     is_finite(scene.vertices[t.v2].p);
-        }
-        if (!finite) continue;
+                               : finite_bounds(scene, i);
+        if (b.empty() || !is_finite(b.lower) || !is_finite(b.upper)) continue;
         RTCBuildPrimitive p;
         p.lower_x = b.lower.x, p.lower_y = b.lower.y, p.lower_z = b.lower.z, p.geomID = 0;
         p.upper_x = b.upper.x, p.upper_y = b.upper.y, p.upper_z = b.upper.z, p.primID = i;
