@@ -56,9 +56,6 @@ void split_primitive(const RTCBuildPrimitive* primitive, unsigned axis, float po
     Bounds3f left = within, right = within;
     if (scene.is_triangle(primitive->primID)) {
         split_triangle_bounds(scene, primitive->primID, within, int(axis), position, left, right);
-        // A sliver that rounding leaves without a box on one side: cut the box alone.
-        if (left.empty()) left = within, left.upper[int(axis)] = min(position, within.upper[int(axis)]);
-        if (right.empty()) right = within, right.lower[int(axis)] = max(position, within.lower[int(axis)]);
     } else {
         left.upper[int(axis)] = min(position, within.upper[int(axis)]);
         right.lower[int(axis)] = max(position, within.lower[int(axis)]);

@@ -5,9 +5,10 @@
 
 namespace ambilux {
 
-/// Box of the part of triangle `prim` in `within` on either side of the plane x[axis] = position. Rounded outwards.
-AMBILUX_HD void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position,
-                           Bounds3f& left, Bounds3f& right) {
+/// Boxes of the parts of triangle `prim` in `within` on either side of the plane x[axis] = position, which meets it.
+/// Rounded outwards.
+AMBILUX_HD void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis,
+                                      float position, Bounds3f& left, Bounds3f& right) {
     const Triangle tri = scene.triangles[prim];
     const Vec3f v[3] = {scene.vertices[tri.v0].p, scene.vertices[tri.v1].p, scene.vertices[tri.v2].p};
     left = right = {};
@@ -26,6 +27,9 @@ AMBILUX_HD void split_triangle_bounds(const SceneView& scene, uint32_t prim, con
     right.lower[axis] = max(right.lower[axis], position);
     left.lower = max(left.lower, within.lower), left.upper = min(left.upper, within.upper);
     right.lower = max(right.lower, within.lower), right.upper = min(right.upper, within.upper);
+    // A sliver that rounding leaves without a box on one side: the box alone is cut.
+    if (left.empty()) left = within, left.upper[axis] = min(position, within.upper[axis]);
+    if (right.empty()) right = within, right.lower[axis] = max(position, within.lower[axis]);
 }
 
 }  // namespace ambilux

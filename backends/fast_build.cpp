@@ -28,10 +28,14 @@ FastBuildMemory FastBuildMemory::lay_out(Layout& layout, uint32_t primitives, ui
     const uint32_t n = references, sums = std::max(primitives, n) + 1;
     m.nodes = layout.allocate<fast::Node>(2 * uint64_t(n));
     for (int i = 0; i < 3; ++i) m.boxes[i] = layout.allocate<Bounds3f>(kBoxes[i]);
+    m.room = n;
     m.scan = ScanMemory::lay_out(layout, sums, bytes);
     const auto plans = [&](Layout& l) { m.plans = l.allocate<collapse::Plan>(n); };
     const auto parts = [&](Layout& l) { m.references = l.allocate<fast::Reference>(n); };
-    const auto count = [&](Layout& l) { m.counts = l.allocate<uint32_t>(sums); };
+    const auto count = [&](Layout& l) {
+        m.counts = l.allocate<uint32_t>(sums);
+        m.worth = l.allocate<float>(sums);
+    };
     const auto sort = [&](Layout& l) { m.sort = SortMemory<uint64_t>::lay_out(l, n, bytes); };
     const auto join = [&](Layout& l) {
         for (uint32_t** list : {&m.clusters[0], &m.clusters[1], &m.partner, &m.stays})

@@ -17,8 +17,10 @@ struct FastBuildMemory {
     fast::Reference* references;  ///< where plans are later
     Bounds3f* boxes[3];
     ScanMemory scan;
+    uint32_t room;  ///< for references
     // One after the other in the same place:
     uint32_t* counts;
+    float* worth;
     SortMemory<uint64_t> sort;
     uint32_t *clusters[2], *partner, *stays;
     fast::WideNodes wide;
@@ -36,30 +38,52 @@ struct FastBuild {
 };
 
 /// References that there is room for.
-inline uint32_t fast_references(uint32_t primitives) { return primitives; }
+inline uint32_t fast_references(uint32_t primitives) { return primitives + primitives / 4; }
+/// Times the root of the number of primitives: the most splits per worth. Even triangles are worth less than one.
+constexpr float kMostSplitsOfAll = 2.0f;
 /// Bytes that a build needs for a while.
 uint64_t fast_build_bytes(uint32_t primitives, const PrimitiveBytes& bytes);
 
 namespace detail {
 
+/// Box over all primitives, in the last of `boxes`.
 template <class Exec>
-uint32_t make_references(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
-    const uint32_t primitives = scene.primitive_count();
-    exec.for_each(fast::CountReferences{scene, primitives, m.counts}, primitives + 1);
-    exec.scan(m.scan, m.counts, m.counts, primitives + 1);
-    exec.for_each(fast::MakeReferences{scene, m.counts, m.references}, primitives);
-    return exec.read(m.counts + primitives);
+void join_bounds(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
+    const auto& parts = FastBuildMemory::kBoxes;
+    exec.for_each(fast::JoinBounds<fast::PrimitiveBoxes>{{scene}, scene.primitive_count(), parts[0], m.boxes[0]},
+                  parts[0]);
+    for (int i = 1; i < 3; ++i)
+        exec.for_each(fast::JoinBounds<const Bounds3f*>{m.boxes[i - 1], parts[i - 1], parts[i], m.boxes[i]}, parts[i]);
 }
 
+/// Where those of each primitive go, once triangles are split as often as there is room for.
 template <class Exec>
-void make_leaves(Exec& exec, const FastBuildMemory& m, uint32_t count) {
-    const auto& parts = FastBuildMemory::kBoxes;
-    exec.for_each(fast::JoinBounds<fast::Reference>{m.references, count, parts[0], m.boxes[0]}, parts[0]);
-    for (int i = 1; i < 3; ++i)
-        exec.for_each(fast::JoinBounds<Bounds3f>{m.boxes[i - 1], parts[i - 1], parts[i], m.boxes[i]}, parts[i]);
+uint32_t count_references(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
+    const uint32_t primitives = scene.primitive_count();
+    exec.for_each(fast::WeighSplits{scene, m.boxes[2], m.worth}, primitives);
+    const auto count = [&](float splits) {
+        exec.for_each(fast::CountReferences{m.worth, splits, primitives, m.counts}, primitives + 1);
+        exec.scan(m.scan, m.counts, m.counts, primitives + 1);
+        return exec.read(m.counts + primitives);
+    };
+    const float most = kMostSplitsOfAll * rounded_sqrt(float(primitives));
+    float fits = 0.0f, step = 1.0f;
+    while (fits + step < most && count(fits + step) <= m.room) fits += step, step = fits;
+    for (int i = 0; i < 4; ++i, step *= 0.5f)
+        if (fits + step < most && count(fits + step) <= m.room) fits += step;
+    return count(fits);
+}
+
+/// Returns how many leaves there are.
+template <class Exec>
+uint32_t make_leaves(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
+    join_bounds(exec, scene, m);
+    const uint32_t count = count_references(exec, scene, m);
+    exec.for_each(fast::MakeReferences{scene, m.boxes[2], m.counts, m.references}, scene.primitive_count());
     exec.for_each(fast::MakeCodes{m.references, m.boxes[2], m.sort.keys[0], m.sort.values[0]}, count);
     exec.sort_pairs(m.sort, count, 3 * fast::kGridBits);
     exec.for_each(fast::MakeLeaves{m.references, m.sort.values[1], m.nodes}, count);
+    return count;
 }
 
 /// Joins all leaves in rounds; the root is the last node.
@@ -110,12 +134,11 @@ void widen(Exec& exec, const FastBuildMemory& m, FastBuild& build) {
 template <class Exec>
 FastBuild plan_fast_build(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
     FastBuild build;
-    build.tree = {m.nodes, m.plans, detail::make_references(exec, scene, m)};
+    build.tree = {m.nodes, m.plans, detail::make_leaves(exec, scene, m)};
     if (build.tree.leaves == 0) {
         build.nodes = build.depth = 1;
         return build;
     }
-    detail::make_leaves(exec, m, build.tree.leaves);
     detail::join_leaves(exec, m, build.tree.leaves);
     detail::widen(exec, m, build);
     return build;
