@@ -4,11 +4,32 @@
 #include <string>
 
 #include "accel/embree_api.h"
-#include "accel/split_bounds.h"
 #include "core/error.h"
 #include "core/parallel.h"
 
 namespace ambilux {
+
+void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position,
+                           Bounds3f& left, Bounds3f& right) {
+    const Triangle tri = scene.triangles[prim];
+    const Vec3f v[3] = {scene.vertices[tri.v0].p, scene.vertices[tri.v1].p, scene.vertices[tri.v2].p};
+    left = right = {};
+    for (int i = 0; i < 3; ++i) {
+        const Vec3f a = v[i], b = v[(i + 1) % 3];
+        if (a[axis] <= position) left.extend(a);
+        if (a[axis] >= position) right.extend(a);
+        if ((a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position)) {
+            const Vec3f c = a + (b - a) * ((position - a[axis]) / (b[axis] - a[axis]));
+            const Vec3f pad = max(abs(a), abs(b)) * gamma_bound(6);
+            left.extend(c - pad), left.extend(c + pad);
+            right.extend(c - pad), right.extend(c + pad);
+        }
+    }
+    left.upper[axis] = min(left.upper[axis], position);
+    right.lower[axis] = max(right.lower[axis], position);
+    left.lower = max(left.lower, within.lower), left.upper = min(left.upper, within.upper);
+    right.lower = max(right.lower, within.lower), right.upper = min(right.upper, within.upper);
+}
 
 namespace {
 
@@ -56,6 +77,9 @@ void split_primitive(const RTCBuildPrimitive* primitive, unsigned axis, float po
     Bounds3f left = within, right = within;
     if (scene.is_triangle(primitive->primID)) {
         split_triangle_bounds(scene, primitive->primID, within, int(axis), position, left, right);
+        // A sliver that rounding leaves without a box on one side: cut the box alone.
+        if (left.empty()) left = within, left.upper[int(axis)] = min(position, within.upper[int(axis)]);
+        if (right.empty()) right = within, right.lower[int(axis)] = max(position, within.lower[int(axis)]);
     } else {
         left.upper[int(axis)] = min(position, within.upper[int(axis)]);
         right.lower[int(axis)] = max(position, within.lower[int(axis)]);

@@ -29,6 +29,10 @@ struct Bvh2 {
 /// there. Throws Error(device) when Embree fails.
 Bvh2 build_bvh2(const SceneView& scene, const Group* group = nullptr);
 
+/// Box of the part of triangle `prim` in `within` on either side of the plane x[axis] = position. Rounded outwards.
+void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position,
+                           Bounds3f& left, Bounds3f& right);
+
 /// Lowers the sum of areas of inner nodes by taking subtrees out and inserting them where they cost least (Meister and
 /// Bittner 2018). Up to `passes` over the largest tenth of the nodes; the result does not depend on the number of
 /// threads.

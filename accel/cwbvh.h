@@ -204,7 +204,9 @@ public:
     uint64_t memory_bytes() const { return arrays_.bytes(); }
     double build_seconds() const { return build_seconds_; }
 
-private:
+protected:
+    CwbvhAccel() = default;
+
     CwbvhArrays arrays_;
     double build_seconds_ = 0;
 };

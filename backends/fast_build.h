@@ -2,6 +2,8 @@
 // a device run alike, to the same bits.
 #pragma once
 
+#include <vector>
+
 #include "accel/fast/wide.h"
 #include "queues/layout.h"
 #include "queues/primitives.h"
@@ -17,19 +19,31 @@ struct FastBuildMemory {
     fast::Reference* references;  ///< where plans are later
     Bounds3f* boxes[3];
     ScanMemory scan;
-    uint32_t room;  ///< for references
     // One after the other in the same place:
     uint32_t* counts;
-    float* worth;
     SortMemory<uint64_t> sort;
     uint32_t *clusters[2], *partner, *stays;
+    fast::Node* top_nodes;
+    collapse::Plan* top_plans;
     fast::WideNodes wide;
     uint32_t *inner, *primitives;  ///< of a level
 
-    /// For `primitives` of a scene and at most `references`.
-    [[gnu::cold]] static FastBuildMemory lay_out(Layout& layout, uint32_t primitives, uint32_t references,
-                                                 const PrimitiveBytes& bytes);
+    /// For `primitives` of a scene.
+    [[gnu::cold]] static FastBuildMemory lay_out(Layout& layout, uint32_t primitives, const PrimitiveBytes& bytes);
 };
+
+/// Clusters from which on the tree is improved on the host.
+constexpr uint32_t kTopClusters = 1u << 14;
+
+/// The nodes above them.
+struct FastTop {
+    uint32_t first = 0;                ///< node
+    std::vector<uint32_t> clusters;    ///< as nodes
+    std::vector<fast::Node> nodes;     ///< of the clusters
+    std::vector<collapse::Plan> plans;  ///< of the clusters; improve() makes those of the nodes above of them
+    std::vector<fast::Node> joins;     ///< from `first` on, each behind its children
+};
+void improve(FastTop& top);
 
 /// What a build has found, which write_fast_build needs.
 struct FastBuild {
@@ -37,62 +51,45 @@ struct FastBuild {
     uint32_t nodes = 0, primitives = 0, depth = 0;  ///< of the wide tree
 };
 
-/// References that there is room for.
-inline uint32_t fast_references(uint32_t primitives) { return primitives + primitives / 4; }
-/// Times the root of the number of primitives: the most splits per worth. Even triangles are worth less than one.
-constexpr float kMostSplitsOfAll = 2.0f;
-/// Bytes that a build needs for a while.
-uint64_t fast_build_bytes(uint32_t primitives, const PrimitiveBytes& bytes);
+/// Bytes that a build needs, those of the structure included, unless its nodes have very few children.
+uint64_t fast_build_peak_bytes(uint32_t primitives, const PrimitiveBytes& bytes);
+/// Throws Error(usage) of a scene with groups, whose tree has two levels.
+void check_no_groups(const SceneView& scene);
+/// Throws Error(device) if the tree is deeper than the traversal stack.
+void check_depth(const FastBuild& build);
 
 namespace detail {
-
-/// Box over all primitives, in the last of `boxes`.
-template <class Exec>
-void join_bounds(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
-    const auto& parts = FastBuildMemory::kBoxes;
-    exec.for_each(fast::JoinBounds<fast::PrimitiveBoxes>{{scene}, scene.primitive_count(), parts[0], m.boxes[0]},
-                  parts[0]);
-    for (int i = 1; i < 3; ++i)
-        exec.for_each(fast::JoinBounds<const Bounds3f*>{m.boxes[i - 1], parts[i - 1], parts[i], m.boxes[i]}, parts[i]);
-}
-
-/// Where those of each primitive go, once triangles are split as often as there is room for.
-template <class Exec>
-uint32_t count_references(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
-    const uint32_t primitives = scene.primitive_count();
-    exec.for_each(fast::WeighSplits{scene, m.boxes[2], m.worth}, primitives);
-    const auto count = [&](float splits) {
-        exec.for_each(fast::CountReferences{m.worth, splits, primitives, m.counts}, primitives + 1);
-        exec.scan(m.scan, m.counts, m.counts, primitives + 1);
-        return exec.read(m.counts + primitives);
-    };
-    const float most = kMostSplitsOfAll * rounded_sqrt(float(primitives));
-    float fits = 0.0f, step = 1.0f;
-    while (fits + step < most && count(fits + step) <= m.room) fits += step, step = fits;
-    for (int i = 0; i < 4; ++i, step *= 0.5f)
-        if (fits + step < most && count(fits + step) <= m.room) fits += step;
-    return count(fits);
-}
 
 /// Returns how many leaves there are.
 template <class Exec>
 uint32_t make_leaves(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
-    join_bounds(exec, scene, m);
-    const uint32_t count = count_references(exec, scene, m);
-    exec.for_each(fast::MakeReferences{scene, m.boxes[2], m.counts, m.references}, scene.primitive_count());
+    const uint32_t primitives = scene.primitive_count();
+    exec.for_each(fast::CountReferences{scene, primitives, m.counts}, primitives + 1);
+    exec.scan(m.scan, m.counts, m.counts, primitives + 1);
+    exec.for_each(fast::MakeReferences{scene, m.counts, m.references}, primitives);
+    const uint32_t count = exec.download(m.counts + primitives, 1)[0];
+    const auto& parts = FastBuildMemory::kBoxes;
+    exec.for_each(fast::JoinBounds<fast::Reference>{m.references, count, parts[0], m.boxes[0]}, parts[0]);
+    for (int i = 1; i < 3; ++i)
+        exec.for_each(fast::JoinBounds<Bounds3f>{m.boxes[i - 1], parts[i - 1], parts[i], m.boxes[i]}, parts[i]);
     exec.for_each(fast::MakeCodes{m.references, m.boxes[2], m.sort.keys[0], m.sort.values[0]}, count);
     exec.sort_pairs(m.sort, count, 3 * fast::kGridBits);
     exec.for_each(fast::MakeLeaves{m.references, m.sort.values[1], m.nodes}, count);
     return count;
 }
 
-/// Joins all leaves in rounds; the root is the last node.
+/// Joins all leaves in rounds; the root is the last node. Returns the top: from so many clusters on, where each lies.
 template <class Exec>
-void join_leaves(Exec& exec, const FastBuildMemory& m, uint32_t leaves) {
+FastTop join_leaves(Exec& exec, const FastBuildMemory& m, uint32_t leaves) {
     exec.for_each(fast::FirstClusters{m.clusters[0]}, leaves);
     uint32_t next = leaves;
     bool slow = false;
+    FastTop top;
     for (uint32_t count = leaves, from = 0; count > 1; from ^= 1) {
+        if (top.clusters.empty() && count <= kTopClusters) {
+            top.first = next;
+            top.clusters = exec.download(m.clusters[from], count);
+        }
         if (slow)
             exec.for_each(fast::PairUp{count, m.partner}, count);
         else
@@ -102,35 +99,54 @@ void join_leaves(Exec& exec, const FastBuildMemory& m, uint32_t leaves) {
         exec.for_each(fast::JoinPairs{m.partner, m.stays, m.clusters[from], m.clusters[from ^ 1], m.nodes, m.plans,
                                       leaves, next},
                       count);
-        const uint32_t left = exec.read(m.stays + count);
+        const uint32_t left = exec.download(m.stays + count, 1)[0];
         next += count - left;
         slow = count - left < count / 16;
         count = left;
     }
+    return top;
+}
+
+/// Takes subtrees of the top out and puts them where they cost less: that is where rays pass most, and rounds are
+/// short of choices.
+template <class Exec>
+void improve_top(Exec& exec, const FastBuildMemory& m, uint32_t leaves, FastTop& top) {
+    const uint32_t count = uint32_t(top.clusters.size());
+    if (count < 3) return;
+    // Through memory of rounds that are over.
+    exec.for_each(fast::GatherClusters{m.nodes, m.plans, leaves, exec.upload(m.clusters[0], top.clusters), m.top_nodes,
+                                       m.top_plans},
+                  count);
+    top.nodes = exec.download(m.top_nodes, count);
+    top.plans = exec.download(m.top_plans, count);
+    top.joins = exec.download(m.nodes + top.first, count - 1);
+    improve(top);
+    exec.upload(m.nodes + top.first, top.joins);
+    exec.upload(m.plans + (top.first - leaves), top.plans);
 }
 
 template <class Exec>
 void widen(Exec& exec, const FastBuildMemory& m, FastBuild& build) {
-    exec.write(m.wide.binary, 2 * build.tree.leaves - 2);  // the root
+    exec.upload(m.wide.binary, std::vector<uint32_t>{2 * build.tree.leaves - 2});  // the root
     build.nodes = 1;
     for (uint32_t first = 0; first < build.nodes; ++build.depth) {
         const uint32_t count = build.nodes - first;
         exec.for_each(fast::CountChildren{build.tree, m.wide.binary + first, count, m.inner, m.primitives}, count + 1);
         exec.scan(m.scan, m.inner, m.inner, count + 1);
         exec.scan(m.scan, m.primitives, m.primitives, count + 1);
-        exec.for_each(fast::PlaceChildren{build.tree, m.wide, first, build.nodes, build.primitives, m.inner,
-                                          m.primitives},
-                      count);
+        exec.for_each(
+            fast::PlaceChildren{build.tree, m.wide, first, build.nodes, build.primitives, m.inner, m.primitives},
+            count);
         first = build.nodes;
-        build.nodes += exec.read(m.inner + count);
-        build.primitives += exec.read(m.primitives + count);
+        build.nodes += exec.download(m.inner + count, 1)[0];
+        build.primitives += exec.download(m.primitives + count, 1)[0];
     }
 }
 
 }  // namespace detail
 
 /// All but the nodes themselves, of a scene without groups. `Exec` runs functions over numbers, sorts, sums, and copies
-/// one number from and to its memory.
+/// arrays from and to its memory.
 template <class Exec>
 FastBuild plan_fast_build(Exec& exec, const SceneView& scene, const FastBuildMemory& m) {
     FastBuild build;
@@ -139,7 +155,8 @@ FastBuild plan_fast_build(Exec& exec, const SceneView& scene, const FastBuildMem
         build.nodes = build.depth = 1;
         return build;
     }
-    detail::join_leaves(exec, m, build.tree.leaves);
+    FastTop top = detail::join_leaves(exec, m, build.tree.leaves);
+    detail::improve_top(exec, m, build.tree.leaves, top);
     detail::widen(exec, m, build);
     return build;
 }

@@ -94,6 +94,10 @@ struct MarkStaying {
     }
 };
 
+AMBILUX_HD collapse::Plan plan_of(const Node* nodes, const collapse::Plan* plans, uint32_t leaves, uint32_t i) {
+    return i < leaves ? collapse::primitive_plan(nodes[i].bounds.half_area()) : plans[i - leaves];
+}
+
 /// Joins pairs; `before[i]`: clusters before i that stay.
 struct JoinPairs {
     const uint32_t *partner, *before, *clusters;
@@ -110,15 +114,28 @@ struct JoinPairs {
     }
 
 private:
-    AMBILUX_HD collapse::Plan plan_of(uint32_t i) const {
-        return i < leaves ? collapse::primitive_plan(nodes[i].bounds.half_area()) : plans[i - leaves];
-    }
     AMBILUX_HD uint32_t join(uint32_t left, uint32_t right, uint32_t node) const {
         Bounds3f bounds = nodes[left].bounds;
         bounds.extend(nodes[right].bounds);
         nodes[node] = {bounds, left, right};
-        plans[node - leaves] = collapse::inner_plan(plan_of(left), plan_of(right), bounds.half_area());
+        plans[node - leaves] = 
+            collapse::inner_plan(plan_of(nodes, plans, leaves, left), plan_of(nodes, plans, leaves, right), bounds.half_area());
         return node;
+    }
+};
+
+/// Nodes and plans of clusters.
+struct GatherClusters {
+    const Node* nodes;
+    const collapse::Plan* plans;
+    uint32_t leaves;
+    const uint32_t* clusters;
+    Node* out;
+    collapse::Plan* out_plans;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        out[i] = nodes[clusters[i]];
+        out_plans[i] = plan_of(nodes, plans, leaves, clusters[i]);
     }
 };
 

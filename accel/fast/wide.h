@@ -37,9 +37,9 @@ AMBILUX_HD collapse::Slots choose_slots(const Tree& tree, uint32_t node) {
     return slots;
 }
 
-/// Primitives of a leaf, those of several references once.
+/// Primitives of a leaf.
 struct LeafPrimitives {
-    uint32_t prim[collapse::kMostInLeaf];
+    uint32_t prim[collapse::kMostInLeaf] = {};
     uint32_t count = 0;
 };
 
@@ -50,15 +50,12 @@ AMBILUX_HD LeafPrimitives primitives_of_leaf(const Tree& tree, uint32_t node) {
     stack[top++] = node;
     while (top > 0) {
         const uint32_t at = stack[--top];
-        if (at >= tree.leaves) {
-            stack[top++] = tree.right(at);
-            stack[top++] = tree.left(at);
+        if (at < tree.leaves) {
+            found.prim[found.count++] = tree.right(at);
             continue;
         }
-        const uint32_t prim = tree.right(at);
-        bool known = false;
-        for (uint32_t k = 0; k < found.count; ++k) known = known || found.prim[k] == prim;
-        if (!known) found.prim[found.count++] = prim;
+        stack[top++] = tree.right(at);
+        stack[top++] = tree.left(at);
     }
     return found;
 }
@@ -81,8 +78,9 @@ struct CountChildren {
         if (i >= count) return;
         const collapse::Children children = collapse::children_of(tree, binary[i]);
         for (uint32_t c = 0; c < children.count; ++c) {
-            if (tree.how(children.node[c]).is_leaf())
-                primitives[i] += primitives_of_leaf(tree, children.node[c]).count;
+            const collapse::How how = tree.how(children.node[c]);
+            if (how.is_leaf())
+                primitives[i] += how.primitives();
             else
                 ++inner[i];
         }
