@@ -134,9 +134,8 @@ std::vector<RTCBuildPrimitive> primitives_of(const SceneView& scene, const Group
     primitives.reserve(size_t(count - first) * 2);
     for (uint32_t i = first; i < count; ++i) {
         if (!group && scene.group_count && i >= scene.ungrouped_count() && i < scene.triangle_count) continue;
-        const Bounds3f b = scene.is_instanced(i)
-                               ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
-                               : finite_bounds(scene, i);
+        const Bounds3f b = scene.is_instanced(i) ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
+                                                 : finite_bounds(scene, i);
         if (b.empty() || !is_finite(b.lower) || !is_finite(b.upper)) continue;
         RTCBuildPrimitive p;
         p.lower_x = b.lower.x, p.lower_y = b.lower.y, p.lower_z = b.lower.z, p.geomID = 0;

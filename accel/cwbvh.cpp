@@ -82,7 +82,7 @@ private:
         for (size_t i = order.size(); i-- > 0;) {
             const Bvh2Node& n = bvh_.nodes[order[i]];
             const float area = n.bounds.half_area();
-            plans_[order[i]] = !n.is_leaf()             ? inner_plan(plans_[n.left], plans_[n.right], area)
+            plans_[order[i]] = !n.is_leaf()            ? inner_plan(plans_[n.left], plans_[n.right], area)
                                : is_instance(order[i]) ? instance_plan(area)
                                                        : primitive_plan(area);
         }
@@ -92,8 +92,7 @@ private:
     Slots assign_slots(const Bounds3f& node, const Children& children) const {
         float gain[kWidth][kWidth];
         for (uint32_t c = 0; c < children.count; ++c)
-            for (uint32_t s = 0; s < kWidth; ++s)
-                gain[c][s] = slot_gain(off_middle(bounds(children.node[c]), node), s);
+            for (uint32_t s = 0; s < kWidth; ++s) gain[c][s] = slot_gain(off_middle(bounds(children.node[c]), node), s);
         // best[mask]: children 0..popcount(mask)-1 in the slots of mask.
         std::array<float, 256> best;
         std::array<uint8_t, 256> last;

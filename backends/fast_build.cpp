@@ -113,8 +113,9 @@ uint64_t fast_build_peak_bytes(uint32_t primitives, const PrimitiveBytes& bytes)
 
 void check_no_groups(const SceneView& scene) {
     if (scene.group_count > 0)
-        throw Error(ExitCode::usage, "build=fast: trees of scenes with instances have two levels, which the good builder "
-                                     "makes alone; set build=good");
+        throw Error(ExitCode::usage,
+                    "build=fast: trees of scenes with instances have two levels, which the good builder "
+                    "makes alone; set build=good");
 }
 
 void check_depth(const FastBuild& build) {

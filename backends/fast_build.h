@@ -37,11 +37,11 @@ constexpr uint32_t kTopClusters = 1u << 14;
 
 /// The nodes above them.
 struct FastTop {
-    uint32_t first = 0;                ///< node
-    std::vector<uint32_t> clusters;    ///< as nodes
-    std::vector<fast::Node> nodes;     ///< of the clusters
+    uint32_t first = 0;                 ///< node
+    std::vector<uint32_t> clusters;     ///< as nodes
+    std::vector<fast::Node> nodes;      ///< of the clusters
     std::vector<collapse::Plan> plans;  ///< of the clusters; improve() makes those of the nodes above of them
-    std::vector<fast::Node> joins;     ///< from `first` on, each behind its children
+    std::vector<fast::Node> joins;      ///< from `first` on, each behind its children
 };
 void improve(FastTop& top);
 
@@ -96,9 +96,9 @@ FastTop join_leaves(Exec& exec, const FastBuildMemory& m, uint32_t leaves) {
             exec.for_each(fast::FindPartner{m.nodes, m.clusters[from], count, m.partner}, count);
         exec.for_each(fast::MarkStaying{m.partner, count, m.stays}, count + 1);
         exec.scan(m.scan, m.stays, m.stays, count + 1);
-        exec.for_each(fast::JoinPairs{m.partner, m.stays, m.clusters[from], m.clusters[from ^ 1], m.nodes, m.plans,
-                                      leaves, next},
-                      count);
+        exec.for_each(
+            fast::JoinPairs{m.partner, m.stays, m.clusters[from], m.clusters[from ^ 1], m.nodes, m.plans, leaves, next},
+            count);
         const uint32_t left = exec.download(m.stays + count, 1)[0];
         next += count - left;
         slow = count - left < count / 16;

@@ -185,8 +185,9 @@ private:
             const uint64_t needed = DeviceFastCwbvh::predicted_peak_bytes(maker_.scene.view()),
                            room = this->room(scene_bytes().total());
             if (needed > room)
-                throw Error(ExitCode::device, fmt::format("build=fast: it needs {} MiB for a while, of {} MiB there are",
-                                                          needed >> 20, room >> 20));
+                throw Error(ExitCode::device,
+                            fmt::format("build=fast: it needs {} MiB for a while, of {} MiB there are", needed >> 20,
+                                        room >> 20));
             fast_ = accels.get<DeviceFastCwbvh>();
             peak_ = device_scene_->bytes() + fast_->peak_bytes();
             return true;
@@ -401,7 +402,7 @@ private:
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::shared_ptr<const DeviceFastCwbvh> fast_;  ///< it, if the device has built it
     double upload_seconds_ = 0;                    ///< of the scene, before the structure
-    std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
+    std::optional<DevicePairs> pairs_;             ///< instead, with accel=bvh2
     uint64_t accel_bytes_ = 0, held_ = 0, peak_ = 0;
     DeviceMemory memory_;
     Layout layout_;

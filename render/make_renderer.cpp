@@ -20,7 +20,7 @@ namespace {
 /// Triangles from which on the good builder takes longer than most renders wait, and the seconds that it takes for one
 /// (docs/performance.md).
 constexpr uint32_t kManyTriangles = 1000000;
-constexpr double kGoodSeconds = 4e-6;
+constexpr double kGoodSeconds = 2e-6;
 
 Build settled_build(const RenderSettings& s, bool cuda, const Scene& scene) {
     const size_t triangles = scene.triangles.size();
@@ -36,8 +36,9 @@ Build settled_build(const RenderSettings& s, bool cuda, const Scene& scene) {
 void check_build(const RenderSettings& s, bool cuda) {
     if (s.build != Build::fast) return;
     if (s.automatic)
-        throw Error(ExitCode::usage, "build=fast: the pilot of bdpt.auto=true traces through the good structure; leave "
-                                     "one of the two out, or render with the settings that it chooses");
+        throw Error(ExitCode::usage,
+                    "build=fast: the pilot of bdpt.auto=true traces through the good structure; leave "
+                    "one of the two out, or render with the settings that it chooses");
     if (s.accel == AccelKind::bvh2 || (!cuda && s.accel != AccelKind::cwbvh))
         throw Error(ExitCode::usage, fmt::format("build=fast: it builds accel=cwbvh alone; {}",
                                                  cuda ? "leave one of the two out" : "set that, or leave it out"));
@@ -119,11 +120,10 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
         throw Error(ExitCode::usage, "sampler=sobol: precision=double has independent numbers alone");
     if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
-        return make_automatic(scene, settings, cuda, accels,
-                              [&](RenderSettings chosen) {
-                                  chosen.build = Build::good;  // the pilot's
-                                  return make_from(scene, chosen, accels);
-                              });
+        return make_automatic(scene, settings, cuda, accels, [&](RenderSettings chosen) {
+            chosen.build = Build::good;  // the pilot's
+            return make_from(scene, chosen, accels);
+        });
     return make_on(cuda, scene, settled(settings, variant, cuda, scene), accels);
 }
 

@@ -63,8 +63,8 @@ AMBILUX_HD Bounds3f finite_bounds(const SceneView& scene, uint32_t prim) {
     if (scene.is_triangle(prim)) {
         // min and max skip NaN, so vertices are looked at themselves.
         const Triangle t = scene.triangles[prim];
-        finite = is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) &&
-                 is_finite(scene.vertices[t.v2].p);
+        finite =
+            is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) && is_finite(scene.vertices[t.v2].p);
     }
     return finite ? b : Bounds3f{};
 }

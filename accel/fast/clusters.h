@@ -118,8 +118,8 @@ private:
         Bounds3f bounds = nodes[left].bounds;
         bounds.extend(nodes[right].bounds);
         nodes[node] = {bounds, left, right};
-        plans[node - leaves] = 
-            collapse::inner_plan(plan_of(nodes, plans, leaves, left), plan_of(nodes, plans, leaves, right), bounds.half_area());
+        plans[node - leaves] = collapse::inner_plan(plan_of(nodes, plans, leaves, left),
+                                                    plan_of(nodes, plans, leaves, right), bounds.half_area());
         return node;
     }
 };

@@ -1,5 +1,5 @@
-// The steps of the fast builder as kernels. Compiled without contraction of products and sums (backends/CMakeLists.txt),
-// so that a device builds what a host builds, to the bit.
+// The steps of the fast builder as kernels. Compiled without contraction of products and sums
+// (backends/CMakeLists.txt), so that a device builds what a host builds, to the bit.
 #include "backends/fast_build.h"
 
 #include "backends/cuda/device_scene.h"

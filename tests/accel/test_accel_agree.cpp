@@ -2,8 +2,8 @@
 // labels: accel
 // timeout: 300
 // seconds: 40
-// The host builds of the CUDA traversals, of the wide BVH by both of its builders and of the binary one, against Embree: same rays, same hits
-// (pitfall G12), at every scale (B33).
+// The host builds of the CUDA traversals, of the wide BVH by both of its builders and of the binary one, against
+// Embree: same rays, same hits (pitfall G12), at every scale (B33).
 #include <tbb/task_arena.h>
 
 #include <algorithm>

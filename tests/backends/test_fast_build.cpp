@@ -29,7 +29,7 @@ bool same(const CwbvhArrays& a, const CwbvhArrays& b) {
 
 /// Box of a child in world space.
 Bounds3f child_box(const CwbvhNode& n, int slot) {
-    const auto bytes = [&](const uint32_t (&words)[2]) { return float(words[slot / 4] >> 8 * (slot % 4) & 255u); };
+    const auto bytes = [&](const uint32_t(&words)[2]) { return float(words[slot / 4] >> 8 * (slot % 4) & 255u); };
     const Vec3f step = {bits_float(n.scale_xz & 0x7f800000u) * 0x1p-15f, n.scale_y * 0x1p-15f,
                         bits_float(n.scale_xz << 16) * 0x1p-15f};
     const Vec3f corner = {n.p[0], n.p[1], n.p[2]};
@@ -53,9 +53,8 @@ int leaves_at(const CwbvhArrays& a, uint32_t at, uint32_t prim, Vec3f p) {
         const bool inner = n.valid >> (24 + slot) & 1u, met = meets(child_box(n, slot), p);
         if (inner && met) found += leaves_at(a, child, prim, p);
         child += inner;
-        for (uint32_t bit = 0; bit < 3; ++bit)
-            if (n.valid >> (3 * slot + int(bit)) & 1u && slot * 3 + int(bit) < 24)
-                found += met && a.primitives[primitive++].prim<kAllFeatures>() == prim;
+        const uint32_t end = primitive + uint32_t(detail::count_bits(n.valid >> 3 * slot & 7u));
+        for (; primitive < end; ++primitive) found += met && a.primitives[primitive].prim<kAllFeatures>() == prim;
     }
     return found;
 }
@@ -91,8 +90,10 @@ TEST_CASE("Every point of a triangle lies in a leaf that holds it, and each is s
         for (int i = 0; i < 4; ++i) {
             float u = random.uniform(), v = random.uniform();
             if (u + v > 1) u = 1 - u, v = 1 - v;
-            const Vec3f p = scene.vertices[t.v0].p * (1 - u - v) + scene.vertices[t.v1].p * u + scene.vertices[t.v2].p * v;
-            if (leaves_at(arrays, 0, prim, p) == 0) FAIL("triangle " << prim << " at " << p.x << " " << p.y << " " << p.z);
+            const Vec3f p =
+                scene.vertices[t.v0].p * (1 - u - v) + scene.vertices[t.v1].p * u + scene.vertices[t.v2].p * v;
+            if (leaves_at(arrays, 0, prim, p) == 0)
+                FAIL("triangle " << prim << " at " << p.x << " " << p.y << " " << p.z);
         }
     }
 }
