@@ -185,15 +185,14 @@ private:
             const uint64_t needed = DeviceFastCwbvh::predicted_peak_bytes(maker_.scene.view()),
                            room = this->room(scene_bytes().total());
             if (needed > room)
-                throw Error(ExitCode::device,
-                            fmt::format("build=fast: it needs {} MiB for a while, of {} MiB there are", needed >> 20,
-                                        room >> 20));
+                throw Error(ExitCode::device, "build=fast: it needs " + std::to_string(needed >> 20) +
+                                                  " MiB for a while, of " + std::to_string(room >> 20) + " there are");
             fast_ = accels.get<DeviceFastCwbvh>();
             peak_ = device_scene_->bytes() + fast_->peak_bytes();
             return true;
         } catch (const Error& e) {
             if (!maker_.settings.may_build_fast) throw;
-            log_info(fmt::format("{}. The good builder takes over", e.what()));
+            log_info(std::string(e.what()) + ". The good builder takes over");
             return false;
         }
     }
