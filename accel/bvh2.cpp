@@ -134,19 +134,9 @@ std::vector<RTCBuildPrimitive> primitives_of(const SceneView& scene, const Group
     primitives.reserve(size_t(count - first) * 2);
     for (uint32_t i = first; i < count; ++i) {
         if (!group && scene.group_count && i >= scene.ungrouped_count() && i < scene.triangle_count) continue;
-        const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i)
-                           : scene.is_instanced(i)
-                               ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
-                               : quadric_bounds(scene.quadric(i));
-        if (b.empty()) continue;
-        // min and max skip NaN, so a triangle's vertices are looked at themselves.
-        bool finite = is_finite(b.lower) && is_finite(b.upper);
-        if (scene.is_triangle(i)) {
-            const Triangle t = scene.triangles[i];
-            finite = is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) &&
-                     is_finite(scene.vertices[t.v2].p);
-        }
-        if (!finite) continue;
+        const Bounds3f b = scene.is_instanced(i) ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
+                                                 : finite_bounds(scene, i);
+        if (b.empty() || !is_finite(b.lower) || !is_finite(b.upper)) continue;
         RTCBuildPrimitive p;
         p.lower_x = b.lower.x, p.lower_y = b.lower.y, p.lower_z = b.lower.z, p.geomID = 0;
         p.upper_x = b.upper.x, p.upper_y = b.upper.y, p.upper_z = b.upper.z, p.primID = i;

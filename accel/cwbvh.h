@@ -173,7 +173,17 @@ struct CwbvhArrays {
 inline CwbvhTracer make_tracer(const CwbvhNode* nodes, const CwbvhPrimitive* primitives) { return {nodes, primitives}; }
 
 /// Primitive `prim` as leaves hold it.
-CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim);
+AMBILUX_HD CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim) {
+    CwbvhPrimitive p = {};
+    p.word = prim | (material_of(scene, prim).lets_pass() ? CwbvhPrimitive::kLetsPass : 0);
+    if (scene.is_triangle(prim)) {
+        const Triangle t = scene.triangles[prim];
+        p.v0 = scene.vertices[t.v0].p, p.v1 = scene.vertices[t.v1].p, p.v2 = scene.vertices[t.v2].p;
+        const Vec3f normal = detail::accurate_cross(p.v1 - p.v0, p.v2 - p.v0);
+        p.normal_x = normal.x, p.normal_y = normal.y;
+    }
+    return p;
+}
 
 /// Collapses a binary tree into a wide one of least expected cost (Ylitie et al. 2017, section 5.1), with children in
 /// the slots that make octant order the order along rays (section 3.2). Instances become nodes whose `root` is their
@@ -194,7 +204,9 @@ public:
     uint64_t memory_bytes() const { return arrays_.bytes(); }
     double build_seconds() const { return build_seconds_; }
 
-private:
+protected:
+    CwbvhAccel() = default;
+
     CwbvhArrays arrays_;
     double build_seconds_ = 0;
 };

@@ -16,30 +16,19 @@ bool same_structure(const Scene& a, const Scene& b) {
     return true;
 }
 
-namespace {
-
-template <class T>
-std::shared_ptr<const T> made_once(Structures& structures, std::shared_ptr<const T>& made, const Scene& scene) {
-    const std::lock_guard<std::recursive_mutex> lock(structures.mutex);
-    if (!made) made = std::make_shared<const T>(scene);
-    return made;
-}
-
-}  // namespace
-
 template <>
 std::shared_ptr<const CwbvhAccel> SharedAccels::get() {
-    return made_once(*structures_, structures_->cwbvh, scene_);
+    return made_once(structures_->cwbvh);
 }
 
 template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
-    return made_once(*structures_, structures_->embree, scene_);
+    return made_once(structures_->embree);
 }
 
 template <>
 std::shared_ptr<const Faces> SharedAccels::get() {
-    return made_once(*structures_, structures_->faces, scene_);
+    return made_once(structures_->faces);
 }
 
 template <>

@@ -11,10 +11,12 @@ namespace ambilux {
 
 class CwbvhAccel;
 class EmbreeAccel;
+class FastCwbvhAccel;
 class Faces;
 class LightTree;
 class DeviceScene;
 class DeviceCwbvh;
+class DeviceFastCwbvh;
 class DeviceLightTree;
 class HostTexels;
 
@@ -23,6 +25,7 @@ class HostTexels;
 struct Structures {
     std::recursive_mutex mutex;
     std::shared_ptr<const CwbvhAccel> cwbvh;
+    std::shared_ptr<const FastCwbvhAccel> fast_cwbvh;
     std::shared_ptr<const EmbreeAccel> embree;
     std::shared_ptr<const Faces> faces;
 };
@@ -46,8 +49,8 @@ public:
         if (host_) host_->place_textures(where);
     }
 
-    /// `T`: CwbvhAccel, EmbreeAccel, Faces, LightTree; in builds with CUDA also DeviceScene, DeviceCwbvh,
-    /// DeviceLightTree, HostTexels (backends/cuda/device_scene.h).
+    /// `T`: CwbvhAccel, EmbreeAccel, Faces, LightTree, FastCwbvhAccel (backends/fast_cwbvh.h); in builds with CUDA also
+    /// DeviceScene, DeviceCwbvh, DeviceFastCwbvh, DeviceLightTree, HostTexels (backends/cuda/device_scene.h).
     template <class T>
     std::shared_ptr<const T> get();
 
@@ -60,6 +63,14 @@ private:
         return made;
     }
 
+    /// The same of a structure that scenes may share.
+    template <class T>
+    std::shared_ptr<const T> made_once(std::shared_ptr<const T>& made) {
+        const std::lock_guard<std::recursive_mutex> lock(structures_->mutex);
+        if (!made) made = std::make_shared<const T>(scene_);
+        return made;
+    }
+
     const Scene& scene_;
     SharedAccels* const host_ = nullptr;  ///< whose structures on the host these are; null: its own
     TextureMemory textures_ = TextureMemory::device;
@@ -68,6 +79,7 @@ private:
     std::shared_ptr<const LightTree> light_tree_;
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> device_cwbvh_;
+    std::shared_ptr<const DeviceFastCwbvh> device_fast_cwbvh_;
     std::shared_ptr<const DeviceLightTree> device_light_tree_;
     std::shared_ptr<const HostTexels> host_texels_;
 };

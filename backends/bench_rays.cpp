@@ -9,6 +9,7 @@
 #include "accel/pair_bvh.h"
 #include "backends/cuda/bench_rays.h"
 #include "backends/cuda_device.h"
+#include "backends/fast_cwbvh.h"
 #include "backends/ray_batches.h"
 #include "backends/traversal_features.h"
 #include "core/error.h"
@@ -83,6 +84,19 @@ nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, 
             {"rows", rows}};
 }
 
+/// What a device has built, as if a host had.
+class BuiltOnDevice {
+public:
+    explicit BuiltOnDevice(const Scene& scene) : built_(build_cwbvh_fast_on_device(scene)) {}
+    CwbvhTracer tracer() const { return make_tracer(arrays().nodes.data(), arrays().primitives.data()); }
+    const CwbvhArrays& arrays() const { return built_.arrays; }
+    uint64_t memory_bytes() const { return arrays().bytes(); }
+    double build_seconds() const { return built_.seconds; }
+
+private:
+    FastOnDevice built_;
+};
+
 template <class Accel>
 nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
     if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: " + why_no_cuda_device());
@@ -125,6 +139,10 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
         json = bench_on_host<EmbreeAccel>(scene, "embree", repetitions, true);
     else if (chosen == "cpu-cwbvh")
         json = bench_on_host<CwbvhAccel>(scene, "cwbvh", repetitions);
+    else if (chosen == "cpu-fast")
+        json = bench_on_host<FastCwbvhAccel>(scene, "cwbvh", repetitions);
+    else if (chosen == "cuda-fast")
+        json = bench_on_device<BuiltOnDevice>(scene, "cwbvh", repetitions);
     else if (chosen == "cuda")
         json = bench_on_device<CwbvhAccel>(scene, "cwbvh", repetitions);
     else if (chosen == "cpu-bvh2")
@@ -133,7 +151,8 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
         json = bench_on_device<PairAccel>(scene, "bvh2", repetitions);
     else
         throw Error(ExitCode::usage, "bench rays: backend '" + backend +
-                                         "' is not one of auto, cpu, cpu-single, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
+                                         "' is not one of auto, cpu, cpu-single, cpu-cwbvh, cpu-fast, cpu-bvh2, cuda, "
+                                         "cuda-fast, cuda-bvh2");
     json["backend"] = chosen;
     json["opaque"] = opaque;
     return json;

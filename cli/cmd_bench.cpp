@@ -171,8 +171,8 @@ void add_bench(CLI::App& app, Run& run) {
     r->scene.add_to(rays_command);
     rays_command
         .add_option("--backend", r->backend,
-                    "auto, cpu, cpu-single (no packets), cuda, cuda-bvh2 (a binary BVH), cpu-cwbvh or cpu-bvh2 (the "
-                    "structures of cuda on the CPU)")
+                    "auto, cpu, cpu-single (no packets), cuda, cuda-fast (build=fast), cuda-bvh2 (a binary BVH), "
+                    "cpu-cwbvh, cpu-fast or cpu-bvh2 (the structures of cuda on the CPU)")
         ->capture_default_str();
     rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")
         ->capture_default_str();

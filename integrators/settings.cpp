@@ -122,6 +122,12 @@ std::vector<Setting> main_settings() {
                       "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA"))
             .limit("embree", on_cpu, "the cuda backend has a structure of its own, cwbvh")
             .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
+        Is(Of::choice(
+            "build", &S::build, {"auto", "fast", "good"},
+            "how cwbvh is built: fast, by the device; good, by the CPU, in a hundred times as long, for rays "
+            "that are up to a third faster; auto: fast on CUDA for scenes of a million triangles and more, or "
+            "where the good one would take a fifth of the time that is given (--time); good in experiments "
+            "and with deterministic=true")),
         Is(memory()),
         Is(Of::choice(
                "textures", &S::textures, {"device", "host", "pinned"},

@@ -41,6 +41,13 @@ enum class Precision : uint32_t {
 /// the latter (automatic) or a binary BVH to compare with.
 enum class AccelKind : uint32_t { automatic, embree, cwbvh, bvh2 };
 
+/// How that of CUDA is built.
+enum class Build : uint32_t {
+    automatic,  ///< fast on a device, for scenes of many triangles (may_build_fast); else good
+    fast,       ///< in a hundredth of the time (backends/fast_build.h)
+    good,       ///< for long renders
+};
+
 /// An enumeration to which the names of its setting can be assigned.
 template <class E>
 class Choice {
@@ -98,6 +105,7 @@ struct RenderSettings {
     float rr_cap = kRouletteCap;                     ///< its highest probability of survival
     uint64_t seed = 0;
     Choice<AccelKind> accel = AccelKind::automatic;
+    Build build = Build::automatic;
     uint64_t memory = 0;  ///< most bytes of a render (render/wave_plan.h); 0: what there is
     TextureMemory textures = TextureMemory::device;
     uint32_t wave_size = 0;  ///< paths in flight; 0 chooses
@@ -116,6 +124,8 @@ struct RenderSettings {
     uint64_t expected_samples = 0;
     /// That the render is to take at least; 0: not known. If both are known, it goes on until it has both.
     double expected_seconds = 0;
+    /// What build=auto may do. Experiments leave it.
+    bool may_build_fast = false;
 };
 
 /// Sets one setting from text; throws Error(usage) that names the key, the value and what is allowed.

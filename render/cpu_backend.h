@@ -13,6 +13,7 @@
 #include "backends/cpu/executor.h"
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/whole_executor.h"
+#include "backends/fast_cwbvh.h"
 #include "backends/fusion.h"
 #include "core/error.h"
 #include "core/flag.h"
@@ -50,7 +51,9 @@ public:
             accel_bytes_ = accel->memory_bytes();
             accel_ = accel;
         };
-        if (maker_.settings.accel == AccelKind::cwbvh)
+        if (maker_.settings.accel == AccelKind::cwbvh && maker_.settings.build == Build::fast)
+            hold(accels.get<FastCwbvhAccel>());
+        else if (maker_.settings.accel == AccelKind::cwbvh)
             hold(accels.get<CwbvhAccel>());
         else
             hold(accels.get<EmbreeAccel>());
@@ -65,6 +68,8 @@ public:
         return maker_.tracer;
     }
     void upload(SharedAccels&) {}
+    double upload_seconds() const { return 0; }
+    Build build() const { return maker_.settings.build; }
     SceneBytes scene_bytes() const { return ambilux::scene_bytes(maker_.scene, TextureMemory::device); }
     uint64_t accel_bytes() const { return accel_bytes_; }
     /// Beside scene, structure, film, state and waves.

@@ -9,8 +9,10 @@
 #include "backends/cuda/mean_on_device.h"
 #include "backends/cuda/picture_on_device.h"
 #include "backends/cuda_device.h"
+#include "backends/fast_cwbvh.h"
 #include "backends/fusion.h"
 #include "core/flag.h"
+#include "core/log.h"
 #include "core/seconds.h"
 #include "render/state_memory.h"
 
@@ -52,7 +54,7 @@ public:
             pairs_.emplace(host_pairs_->arrays());
             host_pairs_.reset();
         } else {
-            accel_ = accels.get<DeviceCwbvh>();
+            accel_ = fast_ ? fast_ : accels.get<DeviceCwbvh>();
             maker_.tracer = accel_->tracer();
         }
         if (maker_.picks_by_tree()) {
@@ -61,6 +63,9 @@ public:
         }
         device_scene_->drop_texels();
     }
+    Build build() const { return fast_ ? Build::fast : Build::good; }
+    /// Of what was copied before the structure was made.
+    double upload_seconds() const { return upload_seconds_; }
     SceneBytes scene_bytes() const { return ambilux::scene_bytes(maker_.scene, maker_.settings.textures); }
     uint64_t accel_bytes() const { return accel_bytes_; }
     uint64_t resident_scene_bytes() const {
@@ -155,12 +160,41 @@ private:
             accel_bytes_ = host_pairs_->arrays().bytes();
             return {};
         }
-        const auto accel = accels.get<CwbvhAccel>();
-        accel_bytes_ = accel->arrays().bytes();
+        HostTracer tracer;
+        if (build_fast(accels)) {
+            accel_bytes_ = fast_->bytes();
+            if constexpr (requires { Integrator::pilot(maker_.policy, maker_.view, tracer, uint64_t(0)); })
+                tracer = HostTracer(accels.get<FastCwbvhAccel>()->tracer());  // the same, to the bit
+        } else {
+            const auto accel = accels.get<CwbvhAccel>();
+            accel_bytes_ = accel->arrays().bytes();
+            tracer = HostTracer(accel->tracer());
+        }
         if constexpr (requires { Stages::kTracesConnections; })
             maker_.policy.traces_connections =
                 Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
-        return HostTracer(accel->tracer());
+        return tracer;
+    }
+    /// False if that is not asked for and, with a line in the log, if memory or the depth of the tree forbids it.
+    bool build_fast(SharedAccels& accels) {
+        if (maker_.settings.build != Build::fast) return false;
+        try {
+            const auto start = Clock::now();
+            device_scene_ = accels.get<DeviceScene>();
+            upload_seconds_ = seconds_since(start);
+            const uint64_t needed = DeviceFastCwbvh::predicted_peak_bytes(maker_.scene.view()),
+                           room = this->room(scene_bytes().total());
+            if (needed > room)
+                throw Error(ExitCode::device, "build=fast: it needs " + std::to_string(needed >> 20) +
+                                                  " MiB for a while, of " + std::to_string(room >> 20) + " there are");
+            fast_ = accels.get<DeviceFastCwbvh>();
+            peak_ = device_scene_->bytes() + fast_->peak_bytes();
+            return true;
+        } catch (const Error& e) {
+            if (!maker_.settings.may_build_fast) throw;
+            log_info(std::string(e.what()) + ". The good builder takes over");
+            return false;
+        }
     }
     /// What is launched for each wave of a phase.
     struct Phase {
@@ -365,7 +399,9 @@ private:
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceLightTree> light_tree_;  ///< light_picking=tree only
     std::shared_ptr<const DeviceCwbvh> accel_;
-    std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
+    std::shared_ptr<const DeviceFastCwbvh> fast_;  ///< it, if the device has built it
+    double upload_seconds_ = 0;                    ///< of the scene, before the structure
+    std::optional<DevicePairs> pairs_;             ///< instead, with accel=bvh2
     uint64_t accel_bytes_ = 0, held_ = 0, peak_ = 0;
     DeviceMemory memory_;
     Layout layout_;

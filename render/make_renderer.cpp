@@ -17,6 +17,33 @@
 namespace ambilux {
 namespace {
 
+/// Triangles from which on the good builder takes longer than most renders wait, and the seconds that it takes for one
+/// (docs/performance.md).
+constexpr uint32_t kManyTriangles = 1000000;
+constexpr double kGoodSeconds = 2e-6;
+
+Build settled_build(const RenderSettings& s, bool cuda, const Scene& scene) {
+    const size_t triangles = scene.triangles.size();
+    if (s.build == Build::fast && !scene.groups.empty())
+        log_info("build=fast: trees of scenes with instances have two levels, which the good builder makes alone");
+    if (s.build == Build::good || !scene.groups.empty()) return Build::good;
+    if (s.build == Build::fast) return Build::fast;
+    if (!cuda || !s.may_build_fast || s.accel == AccelKind::bvh2 || s.deterministic) return Build::good;
+    const bool short_time = s.expected_seconds > 0 && kGoodSeconds * double(triangles) > 0.2 * s.expected_seconds;
+    return short_time || (s.expected_seconds <= 0 && triangles >= kManyTriangles) ? Build::fast : Build::good;
+}
+
+void check_build(const RenderSettings& s, bool cuda) {
+    if (s.build != Build::fast) return;
+    if (s.automatic)
+        throw Error(ExitCode::usage,
+                    "build=fast: the pilot of bdpt.auto=true traces through the good structure; leave "
+                    "one of the two out, or render with the settings that it chooses");
+    if (s.accel == AccelKind::bvh2 || (!cuda && s.accel != AccelKind::cwbvh))
+        throw Error(ExitCode::usage, fmt::format("build=fast: it builds accel=cwbvh alone; {}",
+                                                 cuda ? "leave one of the two out" : "set that, or leave it out"));
+}
+
 /// What settings that are left open stand for (docs/performance.md).
 RenderSettings settled(const RenderSettings& settings, const Variant& variant, bool cuda, const Scene& scene) {
     RenderSettings s = settings;
@@ -27,6 +54,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several_bsdfs;
     if (cuda && !cuda_graphs_choose()) s.graph = false;
     if (!light_tree_pays(scene)) s.light_picking = LightPicks::table;
+    s.build = settled_build(s, cuda, scene);
     if (s.draws == CacheDraws::automatic && variant.traits.draws_together)
         s.draws = cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;
@@ -80,6 +108,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     const bool open = settings.backend == Backend::automatic && settings.accel != AccelKind::embree && !in_double;
     const bool cuda = settings.backend == Backend::cuda || (open && cuda_available());
     check_settings(settings, variant, cuda);
+    check_build(settings, cuda);
     accels.place_textures(settings.textures);
     if (in_double && settings.light_picking == LightPicks::tree)
         throw Error(ExitCode::usage, "light_picking=tree: precision=double picks emitters by the table alone");
@@ -87,8 +116,10 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
         throw Error(ExitCode::usage, "sampler=sobol: precision=double has independent numbers alone");
     if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
-        return make_automatic(scene, settings, cuda, accels,
-                              [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
+        return make_automatic(scene, settings, cuda, accels, [&](RenderSettings chosen) {
+            chosen.build = Build::good;  // the pilot's
+            return make_from(scene, chosen, accels);
+        });
     return make_on(cuda, scene, settled(settings, variant, cuda, scene), accels);
 }
 

@@ -23,7 +23,7 @@ public:
         const auto start = Clock::now();
         try {
             const HostTracer tracer = backend_.find_structure(accels);
-            structure_seconds_ = seconds_since(start);
+            structure_seconds_ = seconds_since(start) - backend_.upload_seconds();
             if constexpr (requires { Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed); })
                 maker_.plan.mean = Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed);
             plan_.choose_iterations([&] {
@@ -128,6 +128,7 @@ public:
         s.device = backend_.device();
         s.accel = backend_.accel();
         s.settings = maker_.settings;
+        s.settings.build = backend_.build();
         s.build_seconds = build_seconds_;
         s.structure_seconds = structure_seconds_;
         s.render_seconds = render_seconds_;

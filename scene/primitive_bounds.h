@@ -33,10 +33,10 @@ AMBILUX_HD Bounds3f quadric_bounds(const Quadric& q) {
         const float x = q.to_world.m[i][0], y = q.to_world.m[i][1], z = q.to_world.m[i][2], c = q.to_world.m[i][3];
         float lo, hi;
         if (q.type == PrimitiveType::sphere) {
-            const float r = sqrtf(x * x + y * y + z * z);
+            const float r = rounded_sqrt(x * x + y * y + z * z);
             lo = c - r, hi = c + r;
         } else {
-            const float r = sqrtf(x * x + y * y);
+            const float r = rounded_sqrt(x * x + y * y);
             const float end = q.type == PrimitiveType::cylinder ? z : 0.0f;
             lo = c + min(0.0f, end) - r, hi = c + max(0.0f, end) + r;
         }
@@ -54,6 +54,19 @@ AMBILUX_HD Bounds3f triangle_bounds(const SceneView& scene, uint32_t prim) {
     b.extend(scene.vertices[tri.v1].p);
     b.extend(scene.vertices[tri.v2].p);
     return b;
+}
+
+/// Box of what is stored of primitive `prim`; empty if some of it is not finite.
+AMBILUX_HD Bounds3f finite_bounds(const SceneView& scene, uint32_t prim) {
+    const Bounds3f b = scene.is_triangle(prim) ? triangle_bounds(scene, prim) : quadric_bounds(scene.quadric(prim));
+    bool finite = is_finite(b.lower) && is_finite(b.upper);
+    if (scene.is_triangle(prim)) {
+        // min and max skip NaN, so vertices are looked at themselves.
+        const Triangle t = scene.triangles[prim];
+        finite =
+            is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) && is_finite(scene.vertices[t.v2].p);
+    }
+    return finite ? b : Bounds3f{};
 }
 
 /// Box of an instance, with what rounding does to rays that are moved into its group.

@@ -14,6 +14,7 @@ RenderSettings default_settings(const Scene& scene) {
     s.integrator = scene.integrator.type;
     s.max_depth = scene.integrator.max_depth;
     s.rr_depth = scene.integrator.rr_depth;
+    s.may_build_fast = true;
     if (scene.light_picking == "tree") s.light_picking = LightPicks::tree;
     return s;
 }

@@ -61,9 +61,30 @@ public:
     /// What bytes() will be.
     static uint64_t predicted_bytes(const CwbvhArrays& arrays) { return arrays.bytes(); }
 
-private:
+protected:
+    DeviceCwbvh() = default;
+
     DeviceBuffer<CwbvhNode> nodes_;
     DeviceBuffer<CwbvhPrimitive> primitives_;
+};
+
+/// One that the device builds (backends/fast_build.h), of a scene without groups.
+class DeviceFastCwbvh : public DeviceCwbvh {
+public:
+    /// `scene`: on the device. Throws Error(device) when memory runs out or the tree is deeper than traversal stacks.
+    explicit DeviceFastCwbvh(const SceneView& scene);
+
+    double build_seconds() const { return build_seconds_; }
+    /// While it was built.
+    uint64_t peak_bytes() const { return peak_bytes_; }
+    static uint64_t predicted_peak_bytes(const SceneView& scene);
+    /// A copy on the host.
+    CwbvhArrays arrays() const { return {nodes_.download(), primitives_.download(), depth_}; }
+
+private:
+    uint32_t depth_ = 0;
+    uint64_t peak_bytes_ = 0;
+    double build_seconds_ = 0;
 };
 
 /// A binary BVH on the device, likewise.
@@ -107,6 +128,8 @@ template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get<DeviceScene>();
 template <>
 std::shared_ptr<const DeviceCwbvh> SharedAccels::get<DeviceCwbvh>();
+template <>
+std::shared_ptr<const DeviceFastCwbvh> SharedAccels::get<DeviceFastCwbvh>();
 template <>
 std::shared_ptr<const DeviceLightTree> SharedAccels::get<DeviceLightTree>();
 

@@ -3,6 +3,7 @@
 #include "backends/cuda/bench_rays.h"
 #include "backends/cuda/mean_on_device.h"
 #include "backends/cuda_device.h"
+#include "backends/fast_cwbvh.h"
 #include "backends/trace_on_device.h"
 #include "core/error.h"
 
@@ -42,6 +43,8 @@ CudaReport cuda_report() {
 void copy_to_host(const DeviceImage&, std::vector<float>&) { throw not_built(); }
 
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
+
+FastOnDevice build_cwbvh_fast_on_device(const Scene&) { throw not_built(); }
 
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&,
                                                            const std::vector<RayBatch>&, int, int) {

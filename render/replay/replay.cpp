@@ -4,6 +4,7 @@
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
+#include "backends/fast_cwbvh.h"
 #include "core/error.h"
 #include "render/replay/make.h"
 
@@ -44,6 +45,7 @@ std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& se
         replay->accel = accel;
         return replay;
     };
+    if (device_structure && settings.build == Build::fast) return make(accels.get<FastCwbvhAccel>());
     return device_structure ? make(accels.get<CwbvhAccel>()) : make(accels.get<EmbreeAccel>());
 }
 

@@ -1,9 +1,9 @@
-// libs: ambilux_formats ambilux_accel
+// libs: ambilux_backends ambilux_formats ambilux_accel
 // labels: accel
 // timeout: 300
-// seconds: 30
-// The host builds of the CUDA traversals, of the wide BVH and of the binary one, against Embree: same rays, same hits
-// (pitfall G12), at every scale (B33).
+// seconds: 40
+// The host builds of the CUDA traversals, of the wide BVH by both of its builders and of the binary one, against
+// Embree: same rays, same hits (pitfall G12), at every scale (B33).
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "accel/pair_bvh.h"
+#include "backends/fast_cwbvh.h"
 #include "tests/support/accel_scenes.h"
 #include "tests/support/catch.h"
 
@@ -219,6 +220,10 @@ void compare_all(const Scene& scene, uint32_t count, float scale, uint64_t seed,
         INFO("wide");
         compare_with<F, CwbvhAccel>(scene, rays, answers, scale, ties);
     }
+    {
+        INFO("wide, built fast");
+        compare_with<F, FastCwbvhAccel>(scene, rays, answers, scale, ties);
+    }
     INFO("binary");
     compare_with<F, PairAccel>(scene, rays, answers, scale, ties);
 }
@@ -270,7 +275,7 @@ TEST_CASE("Own structures and Embree agree on analytic shapes alone and among tr
     }
 }
 
-TEMPLATE_TEST_CASE("No ray leaves a closed mesh from inside", "", CwbvhAccel, PairAccel) {
+TEMPLATE_TEST_CASE("No ray leaves a closed mesh from inside", "", CwbvhAccel, FastCwbvhAccel, PairAccel) {
     const auto leaks = [](const Scene& scene, float inner, uint32_t count, uint64_t seed) {
         const SceneView view = scene.view();
         const TestType accel(scene);
@@ -319,7 +324,8 @@ TEMPLATE_TEST_CASE("No ray leaves a closed mesh from inside", "", CwbvhAccel, Pa
     CHECK(escaped == 0);
 }
 
-TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAccel, CwbvhAccel, PairAccel) {
+TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAccel, CwbvhAccel, FastCwbvhAccel,
+                   PairAccel) {
     Scene scene = triangle_soup(100, 0.5f, 1.0f, 1);
     add_random_quadrics(scene, 9, 1.0f, 2);
     const SceneView view = scene.view();
@@ -346,7 +352,8 @@ TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAc
     CHECK_FALSE(accel.tracer().template closest<kShapes>(view, {{0, 0, 0}, inf, {0, 0, 0}, 0}, hit));
 }
 
-TEMPLATE_TEST_CASE("Scenes of none, one and many equal primitives", "", EmbreeAccel, CwbvhAccel, PairAccel) {
+TEMPLATE_TEST_CASE("Scenes of none, one and many equal primitives", "", EmbreeAccel, CwbvhAccel, FastCwbvhAccel,
+                   PairAccel) {
     const Ray ray = {{0.25f, 0.25f, -1}, kInfinity, {0, 0, 1}, 0};
     Hit hit;
     Scene empty;
@@ -391,12 +398,13 @@ TEMPLATE_TEST_CASE("Scenes of none, one and many equal primitives", "", EmbreeAc
     CHECK(hit.prim == 0);
 }
 
-TEST_CASE("The structure is the same however often it is built, and its boxes hold what is in them") {
+TEMPLATE_TEST_CASE("The structure is the same however often it is built, and its boxes hold what is in them", "",
+                   CwbvhAccel, FastCwbvhAccel) {
     Scene scene = triangle_soup(20000, 0.4f, 1.0f, 77);
     add_random_quadrics(scene, 30, 1.0f, 78);
-    const CwbvhAccel first(scene);
+    const TestType first(scene);
     for (int i = 0; i < 3; ++i) {
-        const CwbvhAccel again(scene);
+        const TestType again(scene);
         REQUIRE(again.arrays().nodes.size() == first.arrays().nodes.size());
         REQUIRE(again.arrays().primitives.size() == first.arrays().primitives.size());
         CHECK(std::memcmp(again.arrays().nodes.data(), first.arrays().nodes.data(),

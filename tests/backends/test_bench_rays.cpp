@@ -239,11 +239,13 @@ TEST_CASE("rays are traced by the least set of features that a scene needs, of t
 TEST_CASE("bench rays reports complete rows on the CPU, and all structures find the same") {
     const Scene scene = cornell();
     std::map<std::string, double> hit;
-    for (const std::string backend : {"cpu", "cpu-single", "cpu-cwbvh", "cpu-bvh2"}) {
+    for (const std::string backend : {"cpu", "cpu-single", "cpu-cwbvh", "cpu-fast", "cpu-bvh2"}) {
         INFO(backend);
         const nlohmann::json json = bench_rays(scene, backend, 1);
         CHECK(json.at("backend") == backend);
-        CHECK(json.at("accel") == (backend == "cpu" || backend == "cpu-single" ? "embree" : backend.substr(4)));
+        CHECK(json.at("accel") == (backend == "cpu" || backend == "cpu-single" ? "embree"
+                                   : backend == "cpu-bvh2"                     ? "bvh2"
+                                                                               : "cwbvh"));
         CHECK_FALSE(json.at("device").get<std::string>().empty());
         CHECK(json.at("build_seconds") > 0.0);
         CHECK(json.at("accel_bytes") > 1000);
@@ -276,7 +278,7 @@ TEST_CASE("bench rays reports complete rows on the CPU, and all structures find 
 
 TEST_CASE("bench rays of a scene without surfaces has rows of nothing, as often as was asked for") {
     int repetitions = 1;
-    for (const std::string backend : {"cpu-cwbvh", "cpu", "cpu-single", "cpu-bvh2"}) {
+    for (const std::string backend : {"cpu-cwbvh", "cpu", "cpu-single", "cpu-bvh2", "cpu-fast"}) {
         INFO(backend);
         const nlohmann::json json = bench_rays(Scene{}, backend, repetitions);
         CHECK(json.size() == 8);

@@ -302,6 +302,22 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
         device.integrator = backend == std::string("cpu") ? "path" : "bdpt";
         CHECK_THROWS_WITH(make_renderer(scene, device), ContainsSubstring("bvh2") && ContainsSubstring("cwbvh"));
     }
+    RenderSettings fast = settings_of(scene);
+    fast.build = Build::fast;
+    CHECK_THROWS_WITH(make_renderer(scene, fast), ContainsSubstring("build=fast") && ContainsSubstring("accel=cwbvh"));
+}
+
+TEST_CASE("A structure that was built fast gives the image of the good one, and statistics say which it was") {
+    const Scene scene = project_scene("cornell", 32, 32);
+    RenderSettings settings = settings_of(scene);
+    CHECK(make_renderer(scene, settings)->stats().settings.build == Build::good);
+    settings.accel = "cwbvh";
+    const RenderResult good = render_scene(scene, settings, 4);
+    settings.build = Build::fast;
+    const RenderResult fast = render_scene(scene, settings, 4);
+    CHECK(good.stats.settings.build == Build::good);
+    CHECK(fast.stats.settings.build == Build::fast);
+    CHECK(good.film.sum == fast.film.sum);
 }
 
 TEST_CASE("An interrupted render holds exactly the samples that it says", "[path]") {
