@@ -1,0 +1,271 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 300
+// data: tagged
+// Path guiding: whatever was learned, the image is that of the path tracer; densities are those of what is sampled; the
+// trees follow from what was recorded, not from threads, waves or where a render was stopped.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "backends/cpu/host_memory.h"
+#include "backends/cpu/whole_executor.h"
+#include "integrators/offers.h"
+#include "integrators/path/guided/update.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/enough_samples.h"
+#include "tests/support/whole_iterations.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings guided(const Scene& scene, uint64_t seed, const SettingTexts& own = {}) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.variant = "guided";
+    apply_setting(s, "guide_split", "64");
+    for (const auto& [key, value] : own) apply_setting(s, key, value);
+    return s;
+}
+
+/// Trees in memory of their own, and the steps that make them.
+struct Trees {
+    struct Policy {
+        GuidedSettings guided;
+    } policy;
+    HostMemory memory;
+    GuidedState state;
+    StageRecord record{};
+
+    explicit Trees(const GuidedSettings& settings) : policy{settings} {
+        Layout dry;
+        const StateSize size = {0, host_primitive_bytes()};
+        GuidedState::lay_out(dry, policy, size);
+        memory = HostMemory(dry.bytes());
+        Layout placed(dry, memory.data());
+        state = GuidedState::lay_out(placed, policy, size);
+        state.init(policy, [](auto* to, const auto& from) { std::copy(from.begin(), from.end(), to); });
+        state.tree.inverse_side = 1.0f;
+        state.progress->unit = 1.0f;
+    }
+    /// The next step of learning, after `add(leaf)` has recorded what there is in a leaf.
+    template <class Add>
+    void learn(Add add) {
+        for (uint32_t leaf = 0; leaf < state.progress->leaves; ++leaf) add(leaf);
+        GuideStep step = {state, policy.guided, &record, state.progress->rounds};
+        CpuWholeExecutor exec;
+        GuideUpdate::of(step).run(exec);
+    }
+    /// `units` in the cell where direction `d` lies.
+    void put(uint32_t leaf, Vec3f d, int64_t units) const {
+        const GuideQuads::Cell c = state.tree.quads.cell(leaf, square_of_direction(d));
+        state.sums[(leaf * GuideQuads::kNodes + c.node) * 4 + c.quadrant] += units;
+        ++state.records[leaf];
+    }
+    /// Light from one side, some of it from a spot.
+    void put_light(uint32_t leaf, uint32_t records) const {
+        for (uint32_t i = 0; i < records; ++i) {
+            const Vec4f u = random_floats({1, i, leaf, Stream::test}, 0);
+            const bool spot = u.w < 0.5f;
+            Vec3f d = spot ? square_to_cone({u.x, u.y}, 1e-3f) : square_to_sphere({u.x, u.y});
+            if (spot || d.x > 0.2f) put(leaf, d, 1000);
+        }
+    }
+    uint32_t leaves() const { return state.progress->leaves; }
+};
+
+}  // namespace
+
+TEST_CASE("Directions of the unit square are those of the sphere") {
+    for (uint32_t i = 0; i < 10000; ++i) {
+        const Vec4f u = random_floats({1, i, 0, Stream::test}, 0);
+        const Vec2f at = square_of_direction(square_to_sphere({u.x, u.y}));
+        CHECK(std::fabs(at.x - u.x) < 1e-6f);
+        CHECK(std::min(std::fabs(at.y - u.y), 1 - std::fabs(at.y - u.y)) * std::sqrt(u.x * (1 - u.x)) < 1e-6f);
+    }
+    for (const Vec3f d : {Vec3f{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {1, -0.0f, 0}, {-1, 0, 0}, {0, -1, 0}}) {
+        const Vec2f at = square_of_direction(d);
+        CHECK((at.x >= 0 && at.x < 1 && at.y >= 0 && at.y < 1));
+    }
+}
+
+TEST_CASE("A learned density integrates to one, and is that of what is sampled") {
+    for (const GuideTarget target : {GuideTarget::radiance, GuideTarget::moment}) {
+        GuidedSettings settings;
+        settings.target = target;
+        settings.split = 1u << 20;
+        Trees trees(settings);
+        for (int round = 0; round < 4; ++round) trees.learn([&](uint32_t leaf) { trees.put_light(leaf, 20000); });
+        const GuideTree& tree = trees.state.tree;
+        CHECK(trees.leaves() == 1);
+        CHECK(tree.leaves[0].quads > 20);
+        CHECK(tree.leaves[0].quads <= GuideQuads::kNodes);
+        constexpr uint32_t kSide = 64, kSamples = 400'000;
+        std::vector<double> observed(kSide * kSide), expected = observed;
+        double whole = 0;
+        constexpr uint32_t kFine = 1u << GuideQuads::kLevels;
+        for (uint32_t y = 0; y < kFine; ++y)
+            for (uint32_t x = 0; x < kFine; ++x) {
+                const double mass = tree.quads.cell(0, {(x + 0.5f) / kFine, (y + 0.5f) / kFine}).density;
+                whole += mass / kFine / kFine;
+                expected[y * kSide / kFine * kSide + x * kSide / kFine] += mass / kFine / kFine * kSamples;
+            }
+        CHECK(whole == Approx(1).epsilon(1e-5));
+        for (uint32_t i = 0; i < kSamples; ++i) {
+            const Vec4f u = random_floats({2, i, 0, Stream::test}, 0);
+            const Vec3f d = tree.sample(0, {u.x, u.y});
+            const Vec2f at = square_of_direction(d);
+            CHECK(tree.pdf_sa(0, d) > 0);
+            observed[uint32_t(at.y * kSide) * kSide + uint32_t(at.x * kSide)] += 1;
+        }
+        const test::ChiSquare test = test::chi_square(observed, expected);
+        INFO("chi-square " << test.statistic << " of " << test.degrees);
+        CHECK(test.p_value > 1e-4);
+    }
+}
+
+TEST_CASE("Leaves split where many records are, as far as there is room, and their halves have the same quadtree") {
+    for (const uint32_t most : {1u, 5u, 128u, 1000u}) {
+        GuidedSettings settings;
+        settings.split = 100;
+        settings.most_leaves = most;
+        Trees trees(settings);
+        trees.learn([&](uint32_t leaf) { trees.put_light(leaf, 10000); });
+        const GuideTree& tree = trees.state.tree;
+        CHECK(trees.leaves() == (most < 128 ? 1u : 128u));  // about 7000 records
+        for (uint32_t leaf = 0; leaf < trees.leaves(); ++leaf) {
+            CHECK(tree.space[tree.leaves[leaf].node] == (GuideTree::kLeafBit | leaf));
+            CHECK(tree.leaves[leaf].depth == (most < 128 ? 0u : 7u));
+            for (const Vec3f d : {Vec3f{1, 0, 0}, {0, 0, 1}, {-1, 0, 0}})
+                CHECK(tree.pdf_sa(leaf, d) == tree.pdf_sa(0, d));
+        }
+        std::vector<uint32_t> found(trees.leaves());
+        for (uint32_t i = 0; i < 4096; ++i)
+            ++found[tree.leaf({(i & 15) / 16.0f, (i >> 4 & 15) / 16.0f, (i >> 8) / 16.0f})];
+        for (const uint32_t n : found) CHECK(n == 4096 / trees.leaves());
+    }
+}
+
+TEST_CASE("What brought no light leaves the trees as they were") {
+    Trees trees(GuidedSettings{});
+    trees.learn([](uint32_t) {});
+    CHECK(trees.state.tree.leaves[0].bsdf_share == 1.0f);
+    trees.learn([&](uint32_t leaf) { trees.put(leaf, {0, 0, 1}, 5); });
+    CHECK(trees.state.tree.leaves[0].bsdf_share == 0.5f);
+    const float pdf = trees.state.tree.pdf_sa(0, {0, 0, 1});
+    CHECK(pdf == Approx(4 * kInv4Pi));
+    trees.learn([](uint32_t) {});
+    CHECK(trees.state.tree.pdf_sa(0, {0, 0, 1}) == pdf);
+}
+
+TEST_CASE("Guided paths have the expectation of the path tracer", "[path]") {
+    for (const char* name : {"cornell", "materials", "lights"}) {
+        Scene scene = project_scene(name, 48, 32);
+        scene.integrator.hide_emitters = true;
+        const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 768).film);
+        for (const SettingTexts& own : std::vector<SettingTexts>{{}, {{"guide_target", "moment"}}}) {
+            const Estimate image = render_until_seen(scene, guided(scene, 12, own), 512, path, 0.03);
+            const ZTestResult z = z_test(image, path);
+            INFO(name << (own.empty() ? "" : ", moment") << ": " << z.report());
+            CHECK(z.pass);
+            CHECK(sees_bias(image, path, 0.03));
+        }
+    }
+}
+
+TEST_CASE("Guided paths with other estimators, shares and stages of their own agree too", "[path]") {
+    Scene scene = project_scene("cornell", 32, 32);
+    const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 512).film);
+    for (const Estimator estimator : {Estimator::naive, Estimator::nee}) {
+        RenderSettings s = guided(scene, 13, {{"guide_bsdf", "0.2"}, {"guide_filter", "false"}});
+        s.estimator = estimator;
+        const ZTestResult z = z_test(to_estimate(render_scene(scene, s, 512).film), path);
+        INFO(z.report());
+        CHECK(z.pass);
+        s.specialise = false;
+        const RenderResult fused = render_scene(scene, s, 8);
+        s.fuse = Fuse::none;
+        CHECK(render_scene(scene, s, 8).film.sum == fused.film.sum);
+    }
+}
+
+TEST_CASE("What is learned depends on no thread and no size of waves, and a stopped render goes on as it would have") {
+    const Scene scene = project_scene("materials", 40, 24);
+    const RenderSettings s = guided(scene, 5);
+    const RenderResult one = render_on(1, scene, s, 12);
+    for (const int threads : {2, 7}) check_same_bits(render_on(threads, scene, s, 12), one);
+    for (const uint32_t wave_size : {64u, 4096u}) {
+        RenderSettings other = s;
+        other.wave_size = wave_size;
+        check_same_bits(render_scene(scene, other, 12), one);
+    }
+    CHECK(one.stats.memory_bytes == one.stats.memory_bytes_predicted);
+    CHECK(one.stats.invalid.total() == 0);
+
+    const auto first = make_renderer(scene, s), second = make_renderer(scene, s);
+    CHECK(first->iteration_samples() == 4);
+    CHECK_THROWS_AS(first->render(0, 6), Error);
+    first->render(0, 8);
+    const std::vector<std::byte> saved = first->save_state();
+    const FilmMoments before = first->film();
+    second->load_state(saved);
+    second->render(8, 4);
+    FilmMoments whole = second->film();
+    for (size_t i = 0; i < whole.sum.size(); ++i) whole.sum[i] += before.sum[i];
+    for (size_t i = 0; i < whole.sum.size(); ++i) CHECK(whole.sum[i] == Approx(one.film.sum[i]).epsilon(1e-12));
+    first->render(8, 4);
+    CHECK(first->save_state() == second->save_state());
+    CHECK(first->film().sum == one.film.sum);
+}
+
+TEST_CASE("Scenes without light, without surfaces that scatter, and paths of few segments") {
+    for (const int depth : {0, 1, 2, 3}) {
+        const Scene scene = project_scene("cornell", 16, 16);
+        RenderSettings s = guided(scene, 5);
+        s.max_depth = depth;
+        CHECK(render_scene(scene, s, 8).stats.invalid.total() == 0);
+    }
+}
+
+TEST_CASE("Units of light and of length change nothing that is learned") {
+    const auto room = [](double size, double radiance) {
+        return scene_from_text(fmt::format(
+            "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+            "<sensor type='perspective'><float name='fov' value='50'/><float name='near_clip' value='{0}'/><transform "
+            "name='to_world'><lookat origin='0,{1},0' target='0,0,0' up='0,0,1'/></transform><film type='hdrfilm'>"
+            "<integer name='width' value='24'/><integer name='height' value='24'/><rfilter type='box'/></film></sensor>"
+            "<shape type='cube'><transform name='to_world'><scale value='{2}'/></transform><bsdf type='twosided'>"
+            "<bsdf type='diffuse'/></bsdf></shape><shape type='rectangle'><transform name='to_world'><scale "
+            "value='{3}'/><translate z='{4}'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+            "<shape type='rectangle'><transform name='to_world'><scale value='{5}'/><translate z='{6}'/></transform>"
+            "<emitter type='area'><rgb name='radiance' value='{7}'/></emitter></shape></scene>",
+            0.001 * size, 0.9 * size, size, 0.5 * size, 0.5 * size, 0.3 * size, 0.7 * size, radiance));
+    };
+    const auto mean = [&](double size, double radiance) {
+        const Scene scene = room(size, radiance);
+        const RenderResult r = render_scene(scene, guided(scene, 7), 16);
+        CHECK(r.stats.invalid.total() == 0);
+        return mean_of(r.film) / radiance;
+    };
+    const double usual = mean(1, 1);
+    CHECK(usual > 0);
+    CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
+    for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+}
+
+TEST_CASE("Behind a door ajar guided paths have a third of the variance of others", "[data]") {
+    const auto scene = published_scene("veach-ajar", 64, 36);
+    if (!scene) return;
+    const auto variance = [&](const RenderSettings& s) {
+        const FilmMoments film = render_scene(*scene, s, 256).film;
+        double sum = 0;
+        const double n = double(film.samples);
+        for (size_t i = 0; i < film.sum.size(); ++i) {
+            const double mean = film.sum[i] / n;
+            sum += (film.sum_squares[i] / n - mean * mean) / (mean * mean + 0.01);
+        }
+        return sum / double(film.sum.size());
+    };
+    const double plain = variance(cpu_settings(*scene, Estimator::mis, 3)), learned = variance(guided(*scene, 3));
+    INFO(plain << " and " << learned);
+    CHECK(learned < plain / 3);
+}
