@@ -45,7 +45,7 @@ struct Trees {
         state = GuidedState::lay_out(placed, policy, size);
         state.init(policy, [](auto* to, const auto& from) { std::copy(from.begin(), from.end(), to); });
         state.tree.inverse_side = 1.0f;
-        state.progress->unit = 1.0f;
+        state.progress->unit[0] = 1.0f;
     }
     /// The next step of learning, after `add(leaf)` has recorded what there is in a leaf.
     template <class Add>
@@ -99,16 +99,22 @@ TEST_CASE("A learned density integrates to one, and is that of what is sampled")
         CHECK(trees.leaves() == 1);
         CHECK(tree.leaves[0].quads > 20);
         CHECK(tree.leaves[0].quads <= GuideQuads::kNodes);
-        constexpr uint32_t kSide = 64, kSamples = 400'000;
+        constexpr uint32_t kSide = 64, kSamples = 200'000;
         std::vector<double> observed(kSide * kSide), expected = observed;
         double whole = 0;
-        constexpr uint32_t kFine = 1u << GuideQuads::kLevels;
-        for (uint32_t y = 0; y < kFine; ++y)
-            for (uint32_t x = 0; x < kFine; ++x) {
-                const double mass = tree.quads.cell(0, {(x + 0.5f) / kFine, (y + 0.5f) / kFine}).density;
-                whole += mass / kFine / kFine;
-                expected[y * kSide / kFine * kSide + x * kSide / kFine] += mass / kFine / kFine * kSamples;
+        // Squares of side 2^-level, as small as the cells that they lie in.
+        const auto add = [&](auto&& self, uint32_t x, uint32_t y, uint32_t level) -> void {
+            const float side = GuideQuads::side(level);
+            const GuideQuads::Cell cell = tree.quads.cell(0, {(float(x) + 0.5f) * side, (float(y) + 0.5f) * side});
+            if (cell.level > level || level < 6) {
+                for (uint32_t q = 0; q < 4; ++q) self(self, 2 * x + (q & 1), 2 * y + q / 2, level + 1);
+                return;
             }
+            const double mass = double(cell.density) * double(side) * double(side);
+            whole += mass;
+            expected[(y >> (level - 6)) * kSide + (x >> (level - 6))] += mass * kSamples;
+        };
+        add(add, 0, 0, 0);
         CHECK(whole == Approx(1).epsilon(1e-5));
         for (uint32_t i = 0; i < kSamples; ++i) {
             const Vec4f u = random_floats({2, i, 0, Stream::test}, 0);
@@ -155,6 +161,23 @@ TEST_CASE("What brought no light leaves the trees as they were") {
     CHECK(pdf == Approx(4 * kInv4Pi));
     trees.learn([](uint32_t) {});
     CHECK(trees.state.tree.pdf_sa(0, {0, 0, 1}) == pdf);
+}
+
+TEST_CASE("A leaf takes the share of the BSDF with which its records would have had the least second moment") {
+    GuidedSettings settings;
+    for (const bool learns : {true, false}) {
+        settings.learn_share = learns;
+        Trees trees(settings);
+        const auto record = [&](uint32_t leaf) {
+            trees.put_light(leaf, 100);
+            for (uint32_t k = 0; k < GuideShares::kCount; ++k)
+                trees.state.shares[leaf * GuideShares::kCount + k] = k == 6 ? 10 : 20;
+        };
+        trees.learn(record);
+        CHECK(trees.state.tree.leaves[0].bsdf_share == settings.bsdf_share);  // nothing was guided yet
+        trees.learn(record);
+        CHECK(trees.state.tree.leaves[0].bsdf_share == (learns ? GuideShares::of(6) : settings.bsdf_share));
+    }
 }
 
 TEST_CASE("Guided paths have the expectation of the path tracer", "[path]") {

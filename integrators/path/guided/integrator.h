@@ -84,10 +84,9 @@ struct PathGuidedIntegrator {
             generate_training.training = p.training;
             generate_training.progress = s.progress;
             for (int k = 0; k < 2; ++k)
-                record[k] = {parts.wave, p.training,   p.guided.target, m.path.subpaths.hits[k],
-                             m.records,  samples, note(RecordRays<Mis>::kName)};
-            learn = {parts.wave, p.training, p.guided.target,          p.guided.filter, s,
-                     m.records,  samples,    note(LearnRecords::kName)};
+                record[k] = {parts.wave, p.training, m.path.subpaths.hits[k],
+                             m.records,  samples,    note(RecordRays<Mis>::kName)};
+            learn = {parts.wave, p.training, p.guided, s, m.records, samples, note(LearnRecords::kName)};
             update = {s, p.guided, note(GuideStep::kName)};
         }
         /// Statistics tell apart what paths outside of the image take.

@@ -29,10 +29,15 @@ struct GuideTraining {
 /// A scattered ray.
 struct GuideRecord {
     Vec3f p;
-    float scale;  ///< what is learned is scale · (what the path brings after it), for target moment its square; 0: none
-    Vec2f direction;  ///< in the unit square
-    float before;     ///< luminance that the path had brought
-    uint32_t pad;
+    float pdf_sa;         ///< of its direction; 0: there is no record
+    uint32_t direction;   ///< in the unit square, twice 16 bits
+    float brought;        ///< luminance that the path had brought before
+    float before, after;  ///< luminance of its throughput before it was scattered and after
+
+    AMBILUX_HD static uint32_t pack(Vec2f d) { return uint32_t(d.x * 0x1p16f) | uint32_t(d.y * 0x1p16f) << 16; }
+    AMBILUX_HD Vec2f place() const {
+        return {(float(direction & 0xffffu) + 0.5f) * 0x1p-16f, (float(direction >> 16) + 0.5f) * 0x1p-16f};
+    }
 };
 
 /// Camera rays of the slots that train in this round.
@@ -64,7 +69,6 @@ struct RecordRays {
 
     Wave wave;
     GuideTraining training;
-    GuideTarget target;
     Queue<HitItem<RayItem>> hits;
     LaneArray<GuideRecord> records;
     const Lane* samples;
@@ -76,13 +80,11 @@ struct RecordRays {
         if (depth < 2 || depth - 2 >= GuideTraining::kDepths || ray.bits.delta() || !training.trains(wave, ray.path))
             return;
         const Subpath<Mis> path = Items::unpack(ray);
-        const float pdf_sa = path.sums.pdf_sa;
-        const float scale = target == GuideTarget::moment ? sqrtf(pdf_sa) / path.sums.before
-                                                          : 1.0f / (luminance(path.throughput) * pdf_sa);
-        if (!(scale > 0.0f && scale < kInfinity)) return;
+        const float pdf_sa = path.sums.pdf_sa, before = path.sums.before, after = luminance(path.throughput);
+        if (!(pdf_sa > 0.0f && pdf_sa < kInfinity && before > 0.0f && after > 0.0f)) return;
         records.store(training.place(ray.path) + depth - 2,
-                      {path.origin, scale, square_of_direction(path.direction),
-                       luminance(start_of<Rgb>(samples[ray.path])), 0});
+                      {path.origin, pdf_sa, GuideRecord::pack(square_of_direction(path.direction)),
+                       luminance(start_of<Rgb>(samples[ray.path])), before, after});
     }
 };
 
@@ -95,8 +97,7 @@ struct LearnRecords {
 
     Wave wave;
     GuideTraining training;
-    GuideTarget target;
-    bool filter;
+    GuidedSettings settings;
     GuidedState state;
     LaneArray<GuideRecord> records;
     const Lane* samples;
@@ -108,39 +109,63 @@ struct LearnRecords {
         for (uint32_t k = 0; k < GuideTraining::kDepths; ++k) {
             const uint32_t place = training.place(slot) + k;
             const GuideRecord r = records.load(place);
-            if (r.scale == 0.0f) continue;
+            if (r.pdf_sa == 0.0f) continue;
             records.store(place, {});
-            const float after = r.scale * max(brought - r.before, 0.0f);
-            learn(slot, k, r, target == GuideTarget::moment ? after * after : after);
+            const float found = max(brought - r.brought, 0.0f), squared = sqr(found / r.before);
+            if (!(squared < kInfinity)) continue;
+            learn_share(r, squared);
+            learn(slot, k, r,
+                  settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.after * r.pdf_sa));
         }
     }
 
 private:
+    /// `value` in units of `sum`; while there is no unit, of its kind, it is what one will be made of, and 0.
+    AMBILUX_HD float in_units(GuideSum sum, float value) const {
+        const float unit = state.progress->unit[uint32_t(sum)];
+        if (unit > 0.0f) return value / unit;
+        if (value > 0.0f)
+            fetch_add_shared(
+                state.exponents + uint32_t(sum) * GuidedState::kExponents + (float_bits(value) >> kFractionBits), 1);
+        return 0.0f;
+    }
+    /// What the second moment would have been with other shares of the BSDF (GuideShares).
+    AMBILUX_HD void learn_share(const GuideRecord& r, float squared) const {
+        const float units = in_units(GuideSum::moment, squared);
+        if (!settings.learn_share || !(units > 0.0f)) return;
+        const GuideTree& tree = state.tree;
+        const uint32_t leaf = tree.leaf(r.p);
+        const float share = tree.leaves[leaf].bsdf_share;
+        if (share == 1.0f) return;
+        const float guide = kInv4Pi * tree.quads.cell(leaf, r.place()).density,
+                    bsdf = max(r.pdf_sa - (1.0f - share) * guide, 0.0f) / share;
+        for (uint32_t k = 0; k < GuideShares::kCount; ++k) {
+            const float other = GuideShares::of(k), pdf_sa = other * bsdf + (1.0f - other) * guide;
+            fetch_add_shared(state.shares + leaf * GuideShares::kCount + k,
+                             int64_t(min(units * (r.pdf_sa / pdf_sa), GuideShares::kMost)));
+        }
+    }
     AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, float value) const {
         if (!(value < kInfinity)) return;
-        const float unit = state.progress->unit;
-        if (unit == 0.0f) {
-            if (value > 0.0f) fetch_add_shared(state.exponents + (float_bits(value) >> kFractionBits), 1);
-            return;
-        }
+        const float units = min(in_units(GuideSum::target, value), kMost);
+        if (state.progress->unit[uint32_t(GuideSum::target)] == 0.0f) return;
         const GuideTree& tree = state.tree;
-        Vec3f x = tree.unit(r.p);
-        GuideTree::Place at = tree.find(x);
         // Blocks of random numbers beyond those of RandomNumbers.
         const RngKey key = wave.key(slot);
         constexpr uint32_t kFirstBlock = 0x20000u;
-        if (filter) {
+        Vec3f x = tree.unit(r.p);
+        GuideTree::Place at = tree.find(x);
+        if (settings.filter) {
             const Vec4f u = random_floats(key, kFirstBlock + 2 * k);
             const Vec3f side = tree.sides(at.depth);
             x = {moved(x.x, side.x, u.x), moved(x.y, side.y, u.y), moved(x.z, side.z, u.z)};
             at = tree.find(x);
         }
         fetch_add_shared(state.records + at.leaf, 1);
-        const float units = min(value / unit, kMost);
         if (!(units >= 1.0f)) return;
-        Vec2f d = r.direction;
+        Vec2f d = r.place();
         GuideQuads::Cell cell = tree.quads.cell(at.leaf, d);
-        if (filter) {
+        if (settings.filter) {
             const Vec4f u = random_floats(key, kFirstBlock + 2 * k + 1);
             const float side = GuideQuads::side(cell.level), y = d.y + side * (u.y - 0.5f);
             d = {moved(d.x, side, u.x), clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)};

@@ -11,7 +11,10 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
                    "what directions are learned in proportion to: incident radiance (Müller et al. 2017), or the root "
                    "of the second moment of what a sample brings, BSDF and all (Rath et al. 2020)"),
         Of::number("guide_bsdf", &GuidedSettings::bsdf_share, 0.05f, 1.0f,
-                   "share of directions that the BSDF samples; the others follow what was learned"),
+                   "share of directions that the BSDF samples, at first; the others follow what was learned"),
+        Of::flag("guide_learn_bsdf", &GuidedSettings::learn_share,
+                 "every leaf takes the share of the BSDF with which what it found would have had the least second "
+                 "moment"),
         Of::flag("guide_filter", &GuidedSettings::filter,
                  "what a path has found is learned at a random place within the cell around it (Müller 2019)"),
         Of::number("guide_split", &GuidedSettings::split, 16u, 1u << 24,

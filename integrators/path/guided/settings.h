@@ -15,10 +15,11 @@ enum class GuideTarget : uint32_t {
 
 struct GuidedSettings {
     GuideTarget target = GuideTarget::radiance;
-    float bsdf_share = 0.5f;       ///< of directions that the BSDF samples
-    bool filter = true;            ///< what was learned is spread over the cells around it
-    uint32_t split = 1000;         ///< records of a leaf above which it splits, in the first round of training
-    uint32_t most_leaves = 8192;   ///< of the tree over space
+    float bsdf_share = 0.5f;         ///< of directions that the BSDF samples, at first
+    bool learn_share = true;         ///< every leaf has a share of its own from the second update on
+    bool filter = true;              ///< what was learned is spread over the cells around it
+    uint32_t split = 4000;           ///< records of a leaf above which it splits, in the first round of training
+    uint32_t most_leaves = 8192;     ///< of the tree over space
     uint32_t iteration_samples = 4;  ///< samples of every pixel in one iteration
 
     static GuidedSettings plan(const RenderSettings& settings);

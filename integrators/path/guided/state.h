@@ -11,15 +11,27 @@ namespace ambilux {
 /// as the one before, the last all.
 constexpr uint32_t kGuideRounds = 4;
 
+/// What is summed up in integers, in a unit of its own.
+enum class GuideSum : uint32_t { target, moment };
+
+/// Shares of the BSDF that a leaf chooses from: the one with which the second moment of what its records brought would
+/// have been least. A guide that knows little is used little.
+struct GuideShares {
+    static constexpr uint32_t kCount = 8;
+    static constexpr float kMost = 0x1p28f;  ///< units that one record counts, at most
+
+    AMBILUX_HD static float of(uint32_t k) { return (float(k) + 0.5f) / float(kCount); }
+};
+
 /// How far learning has come.
 struct alignas(16) GuideProgress {
     uint32_t rounds;      ///< of training that are done
     uint32_t iterations;  ///< that are done, of this state
     uint32_t updates;     ///< of the trees
     uint32_t leaves;      ///< of the tree over space
-    float unit;           ///< of sums; 0: not known before light was found
+    float unit[2];        ///< of each GuideSum; 0: not known before light was found
     uint32_t updating;    ///< the step at work makes new trees
-    uint32_t pad[2];
+    uint32_t pad;
 };
 
 struct GuidedState {
@@ -29,9 +41,10 @@ struct GuidedState {
     GuideTree tree;
     GuideQuads old;  ///< of an update: quadtrees as they were, with masses
     GuideProgress* progress;
-    int64_t* sums;       ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
+    int64_t* sums;  ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
     int64_t* records;    ///< [leaf]: how many
-    int64_t* exponents;  ///< how many values had this exponent, while there is no unit
+    int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
+    int64_t* exponents;  ///< [sum]: how many values had this exponent, while there is no unit
     uint32_t* splits;    ///< [leaf]: leaves that it gets beside
     uint32_t* places;    ///< sums of splits
     ScanMemory scan;
@@ -48,7 +61,8 @@ struct GuidedState {
         s.progress = layout.allocate<GuideProgress>(1);
         s.sums = layout.allocate<int64_t>(4ull * nodes);
         s.records = layout.allocate<int64_t>(n);
-        s.exponents = layout.allocate<int64_t>(kExponents);
+        s.shares = layout.allocate<int64_t>(n * GuideShares::kCount);
+        s.exponents = layout.allocate<int64_t>(2 * kExponents);
         s.splits = layout.allocate<uint32_t>(n);
         s.places = layout.allocate<uint32_t>(n);
         s.scan = ScanMemory::lay_out(layout, n, size.primitives);
@@ -59,7 +73,7 @@ struct GuidedState {
     void init(const Policy&, Put put) const {
         put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
         put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1.0f, 1}});
-        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, 0.0f, 0, {}}});
+        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0, 0}});
     }
     template <class Visit>
     void for_each_saved(Visit visit) const {
@@ -71,7 +85,8 @@ struct GuidedState {
         visit("guide_children", tree.quads.children, nodes);
         visit("guide_sums", sums, 4 * nodes);
         visit("guide_records", records, n);
-        visit("guide_exponents", exponents, uint64_t(kExponents));
+        visit("guide_shares", shares, n * GuideShares::kCount);
+        visit("guide_exponents", exponents, uint64_t(2 * kExponents));
     }
 };
 

@@ -25,8 +25,8 @@ AMBILUX_HD uint32_t pick_half(float first, float& u) {
 /// A quadtree has its nodes one after the other, parents before children. A node has four quadrants, x + 2y, each of
 /// which is a cell or a node in turn.
 struct GuideQuads {
-    static constexpr uint32_t kNodes = 128;   ///< of a quadtree, at most
-    static constexpr uint32_t kLevels = 12;   ///< cells are no smaller than what rounding of a direction leaves
+    static constexpr uint32_t kNodes = 128;  ///< of a quadtree, at most
+    static constexpr uint32_t kLevels = 12;  ///< cells are no smaller than what rounding of a direction leaves
 
     Lane* masses;        ///< [leaf][node]: probabilities of the four quadrants
     uint32_t* children;  ///< [leaf][node]: node of each quadrant, a byte each; 0: a cell
@@ -87,10 +87,10 @@ struct GuideTree {
     static constexpr uint32_t kLeafBit = 0x80000000u;
     static constexpr uint32_t kMostDepth = 36;
 
-    uint32_t* space;    ///< with kLeafBit a leaf, else the node of the lower half, which that of the upper one follows
+    uint32_t* space;  ///< with kLeafBit a leaf, else the node of the lower half, which that of the upper one follows
     GuideLeaf* leaves;
     GuideQuads quads;
-    Vec3f low;          ///< corner of the cube around the scene
+    Vec3f low;  ///< corner of the cube around the scene
     float inverse_side;
 
     struct Place {

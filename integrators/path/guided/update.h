@@ -25,27 +25,32 @@ struct GuideStep {
     }
 };
 
-/// The first stage of a step, and the unit of sums once light was found: from the mean of all values so far. Nothing is
+/// The first stage of a step, and units of sums once light was found: from the mean of all values so far. Nothing is
 /// learned before.
 struct BeginUpdate : GuideStep {
     AMBILUX_HD void operator()(uint32_t) const {
         GuideProgress& p = progress();
-        p.updating = is_due() && p.unit > 0.0f;
-        if (p.unit > 0.0f || !is_due()) return;
+        p.updating = is_due() && p.unit[0] > 0.0f;
+        if (!is_due()) return;
+        for (uint32_t k = 0; k < 2; ++k)
+            if (p.unit[k] == 0.0f) p.unit[k] = unit_of(state.exponents + k * GuidedState::kExponents);
+    }
+
+private:
+    AMBILUX_HD static float unit_of(const int64_t* exponents) {
         double sum = 0.0, count = 0.0;
         for (uint32_t e = 0; e < GuidedState::kExponents - 1; ++e) {
-            count += double(state.exponents[e]);
-            sum += double(state.exponents[e]) * double(bits_float(FloatBits(e) << kFractionBits));
+            count += double(exponents[e]);
+            sum += double(exponents[e]) * double(bits_float(FloatBits(e) << kFractionBits));
         }
-        const float unit = float(sum / count / double(LearnRecords::kMean));
-        if (count > 0.0) p.unit = clamp(unit, 1e-30f, 1e30f);
+        return count > 0.0 ? clamp(float(sum / count / double(LearnRecords::kMean)), 1e-37f, 1e30f) : 0.0f;
     }
 };
 
 /// A quadtree and its probabilities from the sums of its cells; the sums are zero again.
 struct RefineQuads : GuideStep {
     static constexpr float kLeastRadiance = 0.01f, kLeastMoment = 0.005f;  ///< share of a leaf from which on a
-                                                                            ///< quadrant is a node
+                                                                           ///< quadrant is a node
 
     AMBILUX_HD void operator()(uint32_t leaf) const {
         if (!progress().updating || leaf >= progress().leaves) return;
@@ -57,7 +62,7 @@ struct RefineQuads : GuideStep {
         int64_t* const sums = state.sums + 4ull * first;
         for (uint32_t k = 0; k < 4 * max(nodes, of.quads); ++k) sums[k] = 0;
         of.quads = nodes;
-        of.bsdf_share = settings.bsdf_share;
+        of.bsdf_share = best_share(state.shares + leaf * GuideShares::kCount, of.bsdf_share);
     }
 
 private:
@@ -68,6 +73,15 @@ private:
         uint32_t from;  ///< the old node + 1; 0: there was none
     };
 
+    /// Of the sums, which are zero again. `now`: 1 before anything was learned.
+    AMBILUX_HD float best_share(int64_t* sums, float now) const {
+        if (!settings.learn_share || now == 1.0f || sums[0] == 0) return now == 1.0f ? settings.bsdf_share : now;
+        uint32_t best = 0;
+        for (uint32_t k = 1; k < GuideShares::kCount; ++k)
+            if (sums[k] < sums[best]) best = k;
+        for (uint32_t k = 0; k < GuideShares::kCount; ++k) sums[k] = 0;
+        return GuideShares::of(best);
+    }
     /// Masses of the quadrants of all nodes go to state.old; returns that of all. `first`: the root.
     AMBILUX_HD float sum_up(uint32_t first, uint32_t count) const {
         const GuideQuads &quads = tree().quads, &old = state.old;
