@@ -58,7 +58,9 @@ struct Trees {
     /// `units` in the cell where direction `d` lies.
     void put(uint32_t leaf, Vec3f d, int64_t units) const {
         const GuideQuads::Cell c = state.tree.quads.cell(leaf, square_of_direction(d));
-        state.sums[(leaf * GuideQuads::kNodes + c.node) * 4 + c.quadrant] += units;
+        const size_t place = (leaf * GuideQuads::kNodes + c.node) * 4 + c.quadrant;
+        state.sums[place] += units;
+        ++state.found[place];
         ++state.records[leaf];
     }
     /// Light from one side, some of it from a spot.

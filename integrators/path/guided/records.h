@@ -171,8 +171,9 @@ private:
             d = {moved(d.x, side, u.x), clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)};
             cell = tree.quads.cell(at.leaf, d);
         }
-        fetch_add_shared(state.sums + (at.leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant,
-                         int64_t(units));
+        const uint64_t place = (at.leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
+        fetch_add_shared(state.found + place, 1);
+        fetch_add_shared(state.sums + place, int64_t(units));
     }
     AMBILUX_HD static float moved(float x, float side, float u) {
         return clamp(x + side * (u - 0.5f), 0.0f, kOneMinusEpsilon);

@@ -21,7 +21,7 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
                    "records of a leaf above which it splits in the first round of training; in round k sqrt(2^k) "
                    "times as many"),
         Of::number("guide_leaves", &GuidedSettings::most_leaves, 1u, 1u << 16,
-                   "leaves of the tree over space, at most, of 10 KiB each"),
+                   "leaves of the tree over space, at most, of 14 KiB each"),
         Of::number("guide_samples", &GuidedSettings::iteration_samples, 1u, 1024u,
                    "samples of every pixel in one iteration; training before the first takes up to twice as many"),
     };

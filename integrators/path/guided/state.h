@@ -41,7 +41,8 @@ struct GuidedState {
     GuideTree tree;
     GuideQuads old;  ///< of an update: quadtrees as they were, with masses
     GuideProgress* progress;
-    int64_t* sums;  ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
+    int64_t* sums;   ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
+    int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
     int64_t* records;    ///< [leaf]: how many
     int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
     int64_t* exponents;  ///< [sum]: how many values had this exponent, while there is no unit
@@ -60,6 +61,7 @@ struct GuidedState {
         s.old = {layout.allocate<Lane>(nodes), layout.allocate<uint32_t>(nodes)};
         s.progress = layout.allocate<GuideProgress>(1);
         s.sums = layout.allocate<int64_t>(4ull * nodes);
+        s.found = layout.allocate<int64_t>(4ull * nodes);
         s.records = layout.allocate<int64_t>(n);
         s.shares = layout.allocate<int64_t>(n * GuideShares::kCount);
         s.exponents = layout.allocate<int64_t>(2 * kExponents);
@@ -84,6 +86,7 @@ struct GuidedState {
         visit("guide_masses", tree.quads.masses, nodes);
         visit("guide_children", tree.quads.children, nodes);
         visit("guide_sums", sums, 4 * nodes);
+        visit("guide_found", found, 4 * nodes);
         visit("guide_records", records, n);
         visit("guide_shares", shares, n * GuideShares::kCount);
         visit("guide_exponents", exponents, uint64_t(2 * kExponents));

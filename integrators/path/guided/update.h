@@ -49,6 +49,8 @@ private:
 
 /// A quadtree and its probabilities from the sums of its cells; the sums are zero again.
 struct RefineQuads : GuideStep {
+    static constexpr float kLeastFound = 32.0f;  ///< records of a quadrant from which on it is a node: fewer tell
+                                                 ///< nothing about its parts, and cells without any are not sampled
     static constexpr float kLeastRadiance = 0.01f, kLeastMoment = 0.005f;  ///< share of a leaf from which on a
                                                                            ///< quadrant is a node
 
@@ -59,8 +61,8 @@ struct RefineQuads : GuideStep {
         const float total = sum_up(first, of.quads);
         if (!(total > 0.0f)) return;
         const uint32_t nodes = rebuild(first, total);
-        int64_t* const sums = state.sums + 4ull * first;
-        for (uint32_t k = 0; k < 4 * max(nodes, of.quads); ++k) sums[k] = 0;
+        for (uint64_t k = 4ull * first; k < 4ull * (first + max(nodes, of.quads)); ++k)
+            state.sums[k] = state.found[k] = 0;
         of.quads = nodes;
         of.bsdf_share = best_share(state.shares + leaf * GuideShares::kCount, of.bsdf_share);
     }
@@ -71,6 +73,7 @@ private:
         float mass;
         uint32_t level;
         uint32_t from;  ///< the old node + 1; 0: there was none
+        float found;    ///< records
     };
 
     /// Of the sums, which are zero again. `now`: 1 before anything was learned.
@@ -82,7 +85,8 @@ private:
         for (uint32_t k = 0; k < GuideShares::kCount; ++k) sums[k] = 0;
         return GuideShares::of(best);
     }
-    /// Masses of the quadrants of all nodes go to state.old; returns that of all. `first`: the root.
+    /// Masses of the quadrants of all nodes go to state.old, and records of nodes to the quadrants that they are;
+    /// returns the mass of all. `first`: the root.
     AMBILUX_HD float sum_up(uint32_t first, uint32_t count) const {
         const GuideQuads &quads = tree().quads, &old = state.old;
         set_start(old.masses[first], 0u);
@@ -97,6 +101,7 @@ private:
             const uint32_t level = start_of<uint32_t>(old.masses[n]) + 1;
             const auto mass = [&](uint32_t q) {
                 const uint32_t c = GuideQuads::child(old.children[n], q);
+                if (c) state.found[4ull * n + q] = found_in(first + c);
                 return c ? sum_of(old.probabilities(first + c)) : cell_mass(float(state.sums[4ull * n + q]), level);
             };
             const Vec4f masses = {mass(0), mass(1), mass(2), mass(3)};
@@ -104,6 +109,10 @@ private:
             total = sum_of(masses);
         }
         return total;
+    }
+    AMBILUX_HD int64_t found_in(uint32_t node) const {
+        const int64_t* f = state.found + 4ull * node;
+        return f[0] + f[1] + f[2] + f[3];
     }
     AMBILUX_HD static float sum_of(Vec4f m) { return (m.x + m.y) + (m.z + m.w); }
     /// Of target moment the density is the root of a density.
@@ -115,7 +124,7 @@ private:
         const GuideQuads& quads = tree().quads;
         const float least = total * (settings.target == GuideTarget::moment ? kLeastMoment : kLeastRadiance);
         uint32_t count = 1;
-        set_start(quads.masses[first], Begun{total, 0, 1});
+        set_start(quads.masses[first], Begun{total, 0, 1, 0.0f});
         for (uint32_t n = 0; n < count; ++n) {
             const Begun begun = start_of<Begun>(quads.masses[first + n]);
             const float even = 0.25f * begun.mass;
@@ -124,10 +133,14 @@ private:
             const uint32_t old_children = begun.from ? state.old.children[first + begun.from - 1] : 0;
             uint32_t children = 0;
             for (uint32_t q = 0; q < 4; ++q) {
-                const float m = GuideQuads::of(mass, q);
-                if (!(m > least) || count == GuideQuads::kNodes || begun.level + 2 > GuideQuads::kLevels) continue;
+                const float m = GuideQuads::of(mass, q),
+                            found = begun.from ? float(state.found[4ull * (first + begun.from - 1) + q])
+                                               : 0.25f * begun.found;
+                if (!(m > least && found >= kLeastFound) || count == GuideQuads::kNodes ||
+                    begun.level + 2 > GuideQuads::kLevels)
+                    continue;
                 const uint32_t was = GuideQuads::child(old_children, q);
-                set_start(quads.masses[first + count], Begun{m, begun.level + 1, was ? was + 1 : 0});
+                set_start(quads.masses[first + count], Begun{m, begun.level + 1, was ? was + 1 : 0, found});
                 children |= count++ << 8 * q;
             }
             const float inverse = 1.0f / sum_of(mass);
