@@ -203,7 +203,7 @@ TEST_CASE("Guided paths with other estimators, shares and stages of their own ag
     for (const Estimator estimator : {Estimator::naive, Estimator::nee}) {
         RenderSettings s = guided(scene, 13, {{"guide_bsdf", "0.2"}, {"guide_filter", "false"}});
         s.estimator = estimator;
-        const ZTestResult z = z_test(render_until_seen(scene, s, 512, path, 0.06), path);
+        const ZTestResult z = z_test(render_until_seen(scene, s, 4096, path, 0.06), path);
         INFO(z.report());
         CHECK(z.pass);
         s.specialise = false;
