@@ -61,7 +61,6 @@ struct Trees {
         const size_t place = (leaf * GuideQuads::kNodes + c.node) * 4 + c.quadrant;
         state.sums[place] += units;
         ++state.found[place];
-        ++state.records[leaf];
     }
     /// Light from one side, some of it from a spot.
     void put_light(uint32_t leaf, uint32_t records) const {
@@ -160,7 +159,7 @@ TEST_CASE("What brought no light leaves the trees as they were") {
     trees.learn([&](uint32_t leaf) { trees.put(leaf, {0, 0, 1}, 5); });
     CHECK(trees.state.tree.leaves[0].bsdf_share == 0.5f);
     const float pdf = trees.state.tree.pdf_sa(0, {0, 0, 1});
-    CHECK(pdf == Approx(4 * kInv4Pi));
+    CHECK(pdf == Approx(4 * kInv4Pi * (1 + RefineQuads::kPrior) / (1 + 4 * RefineQuads::kPrior)));
     trees.learn([](uint32_t) {});
     CHECK(trees.state.tree.pdf_sa(0, {0, 0, 1}) == pdf);
 }

@@ -36,6 +36,7 @@ struct GuidedDirections {
         if (!BsdfDirections::sample<F>(v, {u.x / share, u.y, u.z}, mode, s)) return false;
         const float pdf = s.flags & kScatterDelta ? share * s.pdf_sa : mixed(leaf, share, s.pdf_sa, s.wo);
         s.weight = s.weight * (s.pdf_sa / pdf);
+        s.eta *= roulette_scale(s.pdf_sa, pdf);
         s.pdf_sa = pdf;
         return true;
     }
@@ -57,6 +58,12 @@ private:
         if (share == 1.0f) return bsdf_pdf_sa;
         return share * bsdf_pdf_sa + (1.0f - share) * tree.pdf_sa(leaf, wo);
     }
+    /// Where the guide sends more paths than the BSDF would, each weighs less, and roulette by weight would take them
+    /// away again: there it sees what the throughput would be had the BSDF sampled the direction. Where fewer go it
+    /// sees the weight, lest it add to what is large already.
+    AMBILUX_HD static float roulette_scale(float bsdf_pdf_sa, float pdf_sa) {
+        return pdf_sa > bsdf_pdf_sa ? sqrtf(pdf_sa / max(bsdf_pdf_sa, 0x1p-40f * pdf_sa)) : 1.0f;
+    }
     template <Features F, class Mis>
     AMBILUX_HD bool sample_guide(const Vertex<Mis>& v, uint32_t leaf, float share, Vec2f u, TransportMode mode,
                                  BsdfSample& s) const {
@@ -64,8 +71,9 @@ private:
         if (!may_scatter(v.scattering, wo)) return false;
         BsdfValue f = BsdfDirections::evaluate<F>(v, wo, mode);
         if (is_zero(f.value)) return false;
+        const float bsdf_pdf_sa = f.pdf_sa;
         f.pdf_sa = mixed(leaf, share, f.pdf_sa, wo);
-        return smooth_sample(wo, f, 1.0f, 0, s);
+        return smooth_sample(wo, f, roulette_scale(bsdf_pdf_sa, f.pdf_sa), 0, s);
     }
 };
 

@@ -161,7 +161,6 @@ private:
             x = {moved(x.x, side.x, u.x), moved(x.y, side.y, u.y), moved(x.z, side.z, u.z)};
             at = tree.find(x);
         }
-        fetch_add_shared(state.records + at.leaf, 1);
         if (!(units >= 1.0f)) return;
         Vec2f d = r.place();
         GuideQuads::Cell cell = tree.quads.cell(at.leaf, d);

@@ -43,7 +43,7 @@ struct GuidedState {
     GuideProgress* progress;
     int64_t* sums;   ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
     int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
-    int64_t* records;    ///< [leaf]: how many
+    int64_t* records;    ///< [leaf]: of an update: how many brought something
     int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
     int64_t* exponents;  ///< [sum]: how many values had this exponent, while there is no unit
     uint32_t* splits;    ///< [leaf]: leaves that it gets beside
@@ -87,7 +87,6 @@ struct GuidedState {
         visit("guide_children", tree.quads.children, nodes);
         visit("guide_sums", sums, 4 * nodes);
         visit("guide_found", found, 4 * nodes);
-        visit("guide_records", records, n);
         visit("guide_shares", shares, n * GuideShares::kCount);
         visit("guide_exponents", exponents, uint64_t(2 * kExponents));
     }

@@ -49,8 +49,9 @@ private:
 
 /// A quadtree and its probabilities from the sums of its cells; the sums are zero again.
 struct RefineQuads : GuideStep {
-    static constexpr float kLeastFound = 32.0f;  ///< records of a quadrant from which on it is a node: fewer tell
-                                                 ///< nothing about its parts, and cells without any are not sampled
+    static constexpr float kLeastFound = 4.0f;  ///< records of a quadrant from which on it is a node
+    static constexpr float kPrior = 1.0f;       ///< records that every quadrant of a node has beforehand: no density
+                                                ///< is 0, and few records make no spikes
     static constexpr float kLeastRadiance = 0.01f, kLeastMoment = 0.005f;  ///< share of a leaf from which on a
                                                                            ///< quadrant is a node
 
@@ -59,8 +60,10 @@ struct RefineQuads : GuideStep {
         GuideLeaf& of = tree().leaves[leaf];
         const uint32_t first = leaf * GuideQuads::kNodes;
         const float total = sum_up(first, of.quads);
+        const int64_t found = found_in(first);
+        state.records[leaf] = found;
         if (!(total > 0.0f)) return;
-        const uint32_t nodes = rebuild(first, total);
+        const uint32_t nodes = rebuild(first, total, float(found));
         for (uint64_t k = 4ull * first; k < 4ull * (first + max(nodes, of.quads)); ++k)
             state.sums[k] = state.found[k] = 0;
         of.quads = nodes;
@@ -119,12 +122,18 @@ private:
     AMBILUX_HD float cell_mass(float sum, uint32_t level) const {
         return settings.target == GuideTarget::moment ? sqrtf(ldexpf(sum, -2 * int(level))) : sum;
     }
+    /// Of the quadrants of a node with so many records.
+    AMBILUX_HD static Vec4f probabilities(Vec4f mass, float found) {
+        const float inverse = 1.0f / (found + 4.0f * kPrior), scale = found * inverse / sum_of(mass),
+                    more = kPrior * inverse;
+        return {mass.x * scale + more, mass.y * scale + more, mass.z * scale + more, mass.w * scale + more};
+    }
     /// Nodes in the order of their levels. Where there was a cell, a node has four alike. Returns how many.
-    AMBILUX_HD uint32_t rebuild(uint32_t first, float total) const {
+    AMBILUX_HD uint32_t rebuild(uint32_t first, float total, float all_found) const {
         const GuideQuads& quads = tree().quads;
         const float least = total * (settings.target == GuideTarget::moment ? kLeastMoment : kLeastRadiance);
         uint32_t count = 1;
-        set_start(quads.masses[first], Begun{total, 0, 1, 0.0f});
+        set_start(quads.masses[first], Begun{total, 0, 1, all_found});
         for (uint32_t n = 0; n < count; ++n) {
             const Begun begun = start_of<Begun>(quads.masses[first + n]);
             const float even = 0.25f * begun.mass;
@@ -143,9 +152,7 @@ private:
                 set_start(quads.masses[first + count], Begun{m, begun.level + 1, was ? was + 1 : 0, found});
                 children |= count++ << 8 * q;
             }
-            const float inverse = 1.0f / sum_of(mass);
-            set_start(quads.masses[first + n],
-                      Vec4f{mass.x * inverse, mass.y * inverse, mass.z * inverse, mass.w * inverse});
+            set_start(quads.masses[first + n], probabilities(mass, begun.found));
             quads.children[first + n] = children;
         }
         return count;
@@ -159,7 +166,6 @@ struct CountSplits : GuideStep {
         if (!progress().updating || leaf >= progress().leaves) return;
         const float most = float(settings.split) * sqrtf(float(1u << min(progress().updates, 30u)));
         float records = float(state.records[leaf]);
-        state.records[leaf] = 0;
         if (tree().leaves[leaf].bsdf_share == 1.0f) return;
         uint32_t levels = 0, depth = tree().leaves[leaf].depth;
         for (; records > most && depth + levels < GuideTree::kMostDepth && levels < 12; ++levels) records *= 0.5f;
