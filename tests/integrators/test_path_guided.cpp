@@ -1,7 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
-// Path guiding: densities are those of what is sampled; the trees follow from what was recorded, not from threads, waves
-// or where a render was stopped.
+// Path guiding: densities are those of what is sampled; the trees follow from what was recorded, not from threads,
+// waves or where a render was stopped.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -235,4 +235,3 @@ TEST_CASE("Units of light and of length change nothing that is learned") {
     CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
     for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
 }
-

@@ -17,9 +17,10 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
                  "moment"),
         Of::flag("guide_filter", &GuidedSettings::filter,
                  "what a path has found is learned at a random place within the cell around it (Müller 2019)"),
-        Of::number("guide_split", &GuidedSettings::split, 16u, 1u << 24,
-                   "records that brought light to a leaf above which it splits in the first round of training; in round "
-                   "k sqrt(2^k) times as many"),
+        Of::number(
+            "guide_split", &GuidedSettings::split, 16u, 1u << 24,
+            "records that brought light to a leaf above which it splits in the first round of training; in round "
+            "k sqrt(2^k) times as many"),
         Of::number("guide_leaves", &GuidedSettings::most_leaves, 1u, 1u << 16,
                    "leaves of the tree over space, at most, of 14 KiB each"),
         Of::number("guide_samples", &GuidedSettings::iteration_samples, 1u, 1024u,
