@@ -35,7 +35,11 @@ void detail::cross_triangles(const RTCRay16& r, TriangleLanes& lanes) {
 
 struct EmbreeAccel::UserData {
     SceneView view;
-    std::string error;
+    // Embree and `view` read them, for as long as this lives.
+    SharedArray<MeshVertex> vertices;
+    SharedArray<Triangle> triangles;
+    SharedArray<Quadric> quadrics;
+    SharedArray<Instance> instances;
 };
 
 namespace {
@@ -212,6 +216,8 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
     : bytes_(std::make_unique<std::atomic<int64_t>>(0)), user_(std::make_unique<UserData>()),
       triangle_count_(uint32_t(scene.triangles.size())) {
     const auto start = std::chrono::steady_clock::now();
+    user_->vertices = scene.vertices, user_->triangles = scene.triangles;
+    user_->quadrics = scene.quadrics, user_->instances = scene.instances;
     user_->view = scene.view();
     device_ = rtcNewDevice(nullptr);
     if (!device_) throw_embree_error(nullptr, "making a device");

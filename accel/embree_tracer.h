@@ -273,7 +273,7 @@ private:
 };
 
 /// Embree's structure over a scene: triangles as geometry 0, analytic shapes as geometry 1, then instances of
-/// structures over groups. The scene must outlive it.
+/// structures over groups. It shares the arrays of the scene.
 class EmbreeAccel {
 public:
     /// Builds over all TBB threads. Throws Error(device) when Embree fails.

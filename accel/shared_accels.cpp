@@ -7,20 +7,39 @@
 
 namespace ambilux {
 
+bool same_structure(const Scene& a, const Scene& b) {
+    if (!same_geometry(a, b)) return false;
+    if (a.features.bumps != b.features.bumps || a.features.opacity != b.features.opacity) return false;
+    for (size_t i = 0; i < a.shapes.size(); ++i)
+        if (a.materials[a.shapes[i].material].lets_pass() != b.materials[b.shapes[i].material].lets_pass())
+            return false;
+    return true;
+}
+
+namespace {
+
+template <class T>
+std::shared_ptr<const T> made_once(Structures& structures, std::shared_ptr<const T>& made, const Scene& scene) {
+    const std::lock_guard<std::recursive_mutex> lock(structures.mutex);
+    if (!made) made = std::make_shared<const T>(scene);
+    return made;
+}
+
+}  // namespace
+
 template <>
 std::shared_ptr<const CwbvhAccel> SharedAccels::get() {
-    return once(cwbvh_, [&] { return host_ ? host_->get<CwbvhAccel>() : std::make_shared<const CwbvhAccel>(scene_); });
+    return made_once(*structures_, structures_->cwbvh, scene_);
 }
 
 template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
-    return once(embree_,
-                [&] { return host_ ? host_->get<EmbreeAccel>() : std::make_shared<const EmbreeAccel>(scene_); });
+    return made_once(*structures_, structures_->embree, scene_);
 }
 
 template <>
 std::shared_ptr<const Faces> SharedAccels::get() {
-    return once(faces_, [&] { return host_ ? host_->get<Faces>() : std::make_shared<const Faces>(scene_); });
+    return made_once(*structures_, structures_->faces, scene_);
 }
 
 template <>

@@ -18,13 +18,26 @@ class DeviceCwbvh;
 class DeviceLightTree;
 class HostTexels;
 
+/// What follows from the shapes of a scene, and from which of them let rays pass: scenes that have these in common may
+/// share it.
+struct Structures {
+    std::recursive_mutex mutex;
+    std::shared_ptr<const CwbvhAccel> cwbvh;
+    std::shared_ptr<const EmbreeAccel> embree;
+    std::shared_ptr<const Faces> faces;
+};
+
+/// Whether structures of the one serve the other.
+bool same_structure(const Scene& a, const Scene& b);
+
 /// Each is made when it is first asked for, by whichever thread, and lives as long as this object or a renderer that
 /// holds it. The scene must not change meanwhile and must outlive them.
 class SharedAccels {
 public:
-    explicit SharedAccels(const Scene& scene) : scene_(scene) {}
+    explicit SharedAccels(const Scene& scene, std::shared_ptr<Structures> structures = std::make_shared<Structures>())
+        : scene_(scene), structures_(std::move(structures)) {}
     /// For one of several devices: what lies on the host is that of `host`, which must outlive this object.
-    SharedAccels(const Scene& scene, SharedAccels& host) : scene_(scene), host_(&host) {}
+    SharedAccels(const Scene& scene, SharedAccels& host) : scene_(scene), host_(&host), structures_(host.structures_) {}
 
     /// Of copies that are made from now on.
     void place_textures(TextureMemory where) {
@@ -50,10 +63,8 @@ private:
     const Scene& scene_;
     SharedAccels* const host_ = nullptr;  ///< whose structures on the host these are; null: its own
     TextureMemory textures_ = TextureMemory::device;
+    std::shared_ptr<Structures> structures_;
     std::recursive_mutex mutex_;  ///< some are made from others
-    std::shared_ptr<const CwbvhAccel> cwbvh_;
-    std::shared_ptr<const EmbreeAccel> embree_;
-    std::shared_ptr<const Faces> faces_;
     std::shared_ptr<const LightTree> light_tree_;
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> device_cwbvh_;

@@ -203,8 +203,7 @@ nlohmann::json bench_queues(const Scene& scene, const std::string& backend, uint
     if (backend != "auto" && backend != "cpu" && backend != "cuda")
         throw Error(ExitCode::usage, "bench queues: backend '" + backend + "' is not one of auto, cpu, cuda");
     const bool cuda = backend == "cuda" || (backend == "auto" && cuda_device_present());
-    if (cuda && !cuda_device_present())
-        throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
+    if (cuda && !cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: " + why_no_cuda_device());
     if (items == 0) items = cuda ? kCudaItems : kCpuItems;
     if (!cuda) items = (items + kCpuWaveSize - 1) / kCpuWaveSize * kCpuWaveSize;
     const SceneItems from_scene = make_scene_items(scene, items);

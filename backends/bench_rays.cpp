@@ -85,8 +85,7 @@ nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, 
 
 template <class Accel>
 nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
-    if (!cuda_device_present())
-        throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
+    if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: " + why_no_cuda_device());
     const Accel accel(scene);
     const SceneView view = scene.view();
     const std::vector<RayBatch> batches = with_traversal_features(

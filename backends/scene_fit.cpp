@@ -7,10 +7,7 @@
 namespace ambilux {
 namespace {
 
-template <class T>
-uint64_t bytes_of(const std::vector<T>& values) {
-    return values.size() * sizeof(T);
-}
+uint64_t bytes_of(const auto& values) { return values.size() * sizeof values[0]; }
 
 }  // namespace
 

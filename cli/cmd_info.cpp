@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "core/error.h"
 #include "scene/info.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 namespace {
@@ -53,11 +54,9 @@ int info(const InfoArguments& o) {
                        {"accel", stats.accel},
                        {"memory", setting_text(settings, "memory")},
                        {"memory_bytes", stats.memory_bytes}};
-    json["seconds"] = {{"load", loaded.seconds},
-                       {"read", loaded.times.read},
-                       {"place", loaded.times.place},
-                       {"finish", loaded.times.finish},
-                       {"build", stats.build_seconds}};
+    json["seconds"] = seconds_json(stats, loaded.seconds);
+    json["seconds"].update(
+        {{"read", loaded.times.read}, {"place", loaded.times.place}, {"finish", loaded.times.finish}});
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json != "-") print(json, 0);
     return int(ExitCode::done);

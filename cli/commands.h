@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "backends/cuda_device.h"
 #include "core/outputs.h"
 #include "formats/load.h"
 #include "session/hooks.h"
@@ -26,13 +27,18 @@ void add_stress(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_trace(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);
+void add_devices(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);
+
+/// What `ambilux devices` and `ambilux --version` say of devices, in lines.
+std::string devices_text(const CudaReport& report);
 
 /// Options that say which scene is meant.
 struct SceneOptions {
     std::string path, size;
     bool lenient = false;
     std::vector<std::string> parameters;  ///< NAME=VALUE
+    std::vector<std::string> edits;       ///< the same, of parameters by name (formats/edits.h)
     std::string light_picking = "power";
     std::vector<std::string> limits;  ///< KEY=VALUE
 

@@ -40,6 +40,12 @@ void SceneOptions::add_to(CLI::App& command) {
         ->allow_extra_args(false)
         ->type_name("NAME=VALUE");
     command
+        .add_option("--param", edits,
+                    "Another value of a parameter of the scene, by the name of its object: lamp.radiance=2 "
+                    "(docs/scenes.md)")
+        ->allow_extra_args(false)
+        ->type_name("NAME=VALUE");
+    command
         .add_option("--light-picking", light_picking,
                     "How light sampling chooses an emitter: power, uniform or tree (setting light_picking)")
         ->capture_default_str();
@@ -72,6 +78,10 @@ LoadOptions SceneOptions::load_options() const {
             throw Error(ExitCode::usage, fmt::format("--size {}: at most 65536 pixels a side", size));
     }
     for (const std::string& parameter : parameters) options.parameters.push_back(split_assignment(parameter, "-D"));
+    for (const std::string& edit : edits) {
+        const auto [name, value] = split_assignment(edit, "--param");
+        options.edits.push_back({name, value, {}, {}});
+    }
     return options;
 }
 

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <new>
 
+#include "backends/cuda_device.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/manual.h"
@@ -60,7 +61,11 @@ void check_ranks(const std::string& command) {
 int run_program(int argc, const char* const* argv) {
     install_interrupt_handler();
     CLI::App app{"Ambilux: a testbed for bidirectional light transport", "ambilux"};
-    app.set_version_flag("--version", fmt::format("ambilux {} ({})", version(), git_revision()));
+    app.set_version_flag("--version", [] {
+        std::string devices = devices_text(cuda_report());
+        devices.pop_back();  // it ends a line, and so does what prints this
+        return fmt::format("ambilux {} ({})\n{}", version(), git_revision(), devices);
+    });
     app.require_subcommand(1);
     app.fallthrough();
     app.failure_message(wrong_use);
@@ -77,6 +82,7 @@ int run_program(int argc, const char* const* argv) {
     add_bench(app, run);
     add_trace(app, run);
     add_view(app, run);
+    add_devices(app, run);
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {

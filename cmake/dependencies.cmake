@@ -63,6 +63,10 @@ if(NOT AMBILUX_CUDA STREQUAL "OFF")
       set(CMAKE_CUDA_ARCHITECTURES native)
     endif()
   endif()
+  if(CMAKE_CUDA_ARCHITECTURES STREQUAL "every")
+    # Machine code of 8.0 serves 8.6 and 8.9 too, PTX of 8.0 what lies between and comes after. nvcc knows 12.0 from CUDA 12.8 on.
+    set(CMAKE_CUDA_ARCHITECTURES 80-real 90-real 120-real 80-virtual)
+  endif()
   if(NOT AMBILUX_CUDA_OPTIMISE AND CMAKE_CUDA_ARCHITECTURES MATCHES "^[0-9;]+$")
     list(TRANSFORM CMAKE_CUDA_ARCHITECTURES APPEND "-virtual")  # PTX, from which a driver makes what a device runs
   endif()

@@ -19,7 +19,7 @@ namespace {
 constexpr int64_t kMaxSpp = 4294967295;
 
 using Reader = TomlReader;
-using Names = std::set<std::string>;
+using TakenNames = std::set<std::string>;
 
 /// The ground truth: `t` over `inherited`.
 ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::string& where,
@@ -86,13 +86,36 @@ bool is_left_out(const Reader& r, const toml::table& t) {
 }
 
 constexpr const char* kSweptSceneKeys[] = {"size", "max_depth"};
+/// Before the name of a parameter of the scene, and before that of a $parameter of its file.
+constexpr std::string_view kParams = "params.", kParameters = "parameters.";
 
-/// Sets one of kSweptSceneKeys; returns the value as text.
+bool is_named(std::string_view key) { return key.starts_with(kParams) || key.starts_with(kParameters); }
+
+/// A value, or numbers such as those of a colour, joined by `between`.
+std::string scene_value(const Reader& r, const toml::node& value, std::string_view key, const char* between) {
+    if (!value.is_array()) return r.plain(value, key);
+    std::vector<std::string> texts;
+    for (const toml::node& number : r.array(value, key)) texts.push_back(r.plain(number, key));
+    return fmt::format("{}", fmt::join(texts, between));
+}
+
+void set_named(Settings& all, std::string_view name, const std::string& value) {
+    std::erase_if(all, [&](const auto& known) { return known.first == name; });
+    all.emplace_back(std::string(name), value);
+}
+
+/// Sets one of kSweptSceneKeys, or what is_named(); returns the value as text.
 std::string set_scene_key(const Reader& r, const Reduction& reduction, SceneEntry& entry, const std::string& key,
                           const toml::node& value) {
     if (key == "max_depth") {
         entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
         return std::to_string(*entry.max_depth);
+    }
+    if (is_named(key)) {
+        const bool by_name = key.starts_with(kParams);
+        set_named(by_name ? entry.params : entry.parameters, key.substr((by_name ? kParams : kParameters).size()),
+                  scene_value(r, value, key, " "));
+        return scene_value(r, value, key, "_");
     }
     const toml::array& a = r.array(value, key);
     if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
@@ -125,7 +148,10 @@ std::vector<SceneEntry> swept_scenes(const Reader& r, const toml::table& t, cons
                                      const Reduction& reduction) {
     const toml::node* sweep = t.get("sweep");
     if (!sweep) return {scene};
-    r.check_keys(r.table(*sweep, "sweep"), "'sweep' of [[scene]]", {"size", "max_depth"});
+    for (const auto& [key, list] : r.table(*sweep, "sweep"))
+        if (!is_named(key.str()))
+            r.check_keys(toml::table{{key.str(), true}}, "'sweep' of [[scene]]", {"size", "max_depth"},
+                         int(key.source().begin.line));
     for (const char* key : kSweptSceneKeys)
         if (t.get(key) && sweep->as_table()->get(key))
             throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
@@ -144,10 +170,10 @@ std::vector<SceneEntry> swept_scenes(const Reader& r, const toml::table& t, cons
 }
 
 std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference,
-                                   const Reduction& reduction, Names& names) {
+                                   const Reduction& reduction, TakenNames& names) {
     r.check_keys(t, "[[scene]]",
                  {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "optional",
-                  "parameters", "sweep"});
+                  "parameters", "params", "sweep"});
     SceneEntry scene;
     scene.line = Reader::line_of(t);
     scene.name = scene.base = r.name(t, "[[scene]]");
@@ -162,6 +188,9 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     if (const toml::node* parameters = t.get("parameters"))
         for (const auto& [key, value] : r.table(*parameters, "parameters"))
             scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
+    if (const toml::node* params = t.get("params"))
+        for (const auto& [key, value] : r.table(*params, "params"))
+            set_named(scene.params, key.str(), scene_value(r, value, key.str(), " "));
     const std::vector<SceneEntry> scenes = swept_scenes(r, t, scene, reduction);
     for (const SceneEntry& entry : scenes) r.claim(*t.get("name"), entry.name, "[[scene]]", names);
     return scenes;
@@ -311,7 +340,7 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     } else if (reduced) {
         throw input_error(path, 0, "--reduced: it has no section [reduced] that says what is smaller");
     }
-    Names scene_names, run_names;
+    TakenNames scene_names, run_names;
     for (const toml::node& node : r.array(need("scene"), "scene")) {
         if (is_left_out(r, r.table(node, "scene"))) continue;
         for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names))

@@ -41,6 +41,7 @@ struct SceneEntry {
     bool lenient = false;
     bool box_filter = false;  ///< in the place of the scene's own
     Settings parameters;
+    Settings params;  ///< parameters by the names of their objects, and their values (formats/edits.h)
     int line = 0;
 };
 

@@ -8,7 +8,7 @@ namespace ambilux {
 namespace {
 
 using Reader = TomlReader;
-using Names = std::set<std::string>;
+using TakenNames = std::set<std::string>;
 
 /// Adds a setting of a run, unless it belongs elsewhere.
 void add_setting(const Reader& r, RunEntry& run, const std::string& key, const toml::node& value) {
@@ -57,7 +57,7 @@ void add_settings(const Reader& r, RunEntry& run, const toml::table& t) {
         for (const auto& [key, value] : r.table(*set, "set")) add_setting(r, run, std::string(key.str()), value);
 }
 
-std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& names) {
+std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, TakenNames& names) {
     if (is_peer_run(r, t)) {
         RunEntry peer = read_peer_run(r, t);
         r.claim(*t.get("name"), peer.name, "[[run]]", names);
@@ -96,7 +96,7 @@ std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& nam
     return runs;
 }
 
-void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& config, Names& names) {
+void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& config, TakenNames& names) {
     r.check_keys(t, "[ablation]", {"default", "switches"});
     const toml::node& node = r.need(t, "default", "[ablation]");
     config.ablation_default = r.text(node, "default");

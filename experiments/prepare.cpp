@@ -30,6 +30,7 @@ LoadedEntry load_entry(const ExperimentConfig& config, const SceneEntry& entry, 
         options.height = entry.height;
         options.lenient = entry.lenient;
         options.parameters = entry.parameters;
+        for (const auto& [name, value] : entry.params) options.edits.push_back({name, value, {}, {}});
         const auto start = std::chrono::steady_clock::now();
         LoadedEntry loaded;
         loaded.entry = &entry;

@@ -62,6 +62,7 @@ toml::table scene_table(const SceneEntry& s) {
     if (s.max_depth) t.insert("max_depth", int64_t(*s.max_depth));
     if (s.lenient) t.insert("lenient", true);
     if (!s.parameters.empty()) t.insert("parameters", table_of(s.parameters));
+    if (!s.params.empty()) t.insert("params", table_of(s.params));
     return t;
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/nearest.h"
 
 namespace ambilux {
 
@@ -21,12 +22,13 @@ struct TomlReader {
         return input_error(file, line_of(node), message);
     }
 
-    void check_keys(const toml::table& table, const std::string& where, const std::vector<std::string>& known) const {
+    /// `line`: of keys that stand elsewhere.
+    void check_keys(const toml::table& table, const std::string& where, const Names& known, int line = 0) const {
         for (const auto& [key, node] : table)
             if (std::find(known.begin(), known.end(), key.str()) == known.end())
-                throw input_error(
-                    file, int(key.source().begin.line),
-                    fmt::format("unknown key '{}' in {}; known are: {}", key.str(), where, fmt::join(known, ", ")));
+                throw input_error(file, line ? line : int(key.source().begin.line),
+                                  fmt::format("unknown key '{}' in {}{}", key.str(), where,
+                                              suggestion_or_all(known, std::string(key.str()))));
     }
     const toml::node& need(const toml::table& table, std::string_view key, const std::string& where) const {
         if (const toml::node* node = table.get(key)) return *node;

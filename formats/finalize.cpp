@@ -36,8 +36,10 @@ double quadric_area(const Quadric& q) {
     }
 }
 
-void fill_areas(Scene& scene) {
+void fill_areas(Scene& scene, const Scene* before) {
+    const bool same = before && same_geometry(scene, *before);  // whose shapes have their areas
     for (Shape& shape : scene.shapes) {
+        if (same) break;
         double area = 0;
         for (uint32_t i = 0; i < shape.primitive_count; ++i) {
             const uint32_t prim = shape.first_primitive + i;
@@ -55,13 +57,13 @@ void fill_areas(Scene& scene) {
         std::vector<double> areas(shape.primitive_count);
         for (size_t i = 0; i < areas.size(); ++i)
             areas[i] = triangle_area(scene, scene.triangles[shape.first_primitive + i]);
-        const std::vector<float> cdf =
+        std::vector<float> cdf =
             checked_pick_table(scene, areas, "triangles in one light", "split the mesh into several shapes");
-        scene.tables.insert(scene.tables.end(), cdf.begin(), cdf.end());
         // From the table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles the two
         // differ.
         for (size_t i = 0; i < areas.size(); ++i)
-            scene.tables.push_back(areas[i] > 0 ? float((double(cdf[i + 1]) - cdf[i]) / areas[i]) : 0.0f);
+            cdf.push_back(areas[i] > 0 ? float((double(cdf[i + 1]) - cdf[i]) / areas[i]) : 0.0f);
+        scene.tables.append(cdf.data(), cdf.size());
     }
 }
 
@@ -83,19 +85,27 @@ double hat_integral(double x) {
     return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
 }
 
+/// Floats in whole records of four.
+size_t padded(size_t floats) { return (floats + 3) / 4 * 4; }
+
+void append_environment(Scene& scene, Emitter& emitter, size_t height, const float* tables, size_t count) {
+    constexpr float kPadding[4] = {};
+    const size_t end = scene.tables.size(), rows_at = padded(end);
+    scene.tables.append(kPadding, rows_at - end);
+    scene.tables.append(tables, count);
+    emitter.env_rows = uint32_t(rows_at);
+    emitter.env_cells = uint32_t(rows_at + padded(2 * height));
+}
+
 /// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get
 /// these tickets.
 void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, const std::vector<uint32_t>& row_tickets,
                                const std::vector<uint32_t>& cell_tickets) {
-    std::vector<float>& tables = scene.tables;
     // Records lie bitwise among the floats.
-    const size_t height = row_tickets.size(), rows_at = (tables.size() + 3) / 4 * 4,
-                 cells_at = (rows_at + 2 * height + 3) / 4 * 4;
-    tables.resize(cells_at + 4 * width * height);
-    emitter.env_rows = uint32_t(rows_at);
-    emitter.env_cells = uint32_t(cells_at);
+    const size_t height = row_tickets.size(), cells_at = padded(2 * height);
+    std::vector<float> tables(cells_at + 4 * width * height);
     const std::vector<AliasBucket> rows = make_alias_table(row_tickets);
-    memcpy(tables.data() + rows_at, rows.data(), rows.size() * sizeof rows[0]);
+    memcpy(tables.data(), rows.data(), rows.size() * sizeof rows[0]);
     static_assert(sizeof(EnvironmentCell) == 16);
     for (size_t y = 0; y < height; ++y) {
         const uint32_t* tickets = cell_tickets.data() + y * width;
@@ -107,14 +117,33 @@ void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, con
                         float(scale * tickets[buckets[x].alias])};
         memcpy(tables.data() + cells_at + 4 * y * width, cells.data(), width * sizeof cells[0]);
     }
+    append_environment(scene, emitter, height, tables.data(), tables.size());
+}
+
+/// The tables of the same environment map in `before`, if it has that.
+bool take_environment(Scene& scene, Emitter& emitter, const Scene* before) {
+    if (!before || before->environment == kNone) return false;
+    const Emitter& old = before->emitters[before->environment];
+    if (old.type != emitter.type || !(old.radiance.value == emitter.radiance.value)) return false;
+    const Texture &a = scene.textures[size_t(emitter.radiance.texture)],
+                  &b = before->textures[size_t(old.radiance.texture)];
+    const uint8_t *texels = scene.texels.data() + a.offset, *old_texels = before->texels.data() + b.offset;
+    if (a.width != b.width || a.height != b.height || a.format != b.format) return false;
+    if (texels != old_texels && memcmp(texels, old_texels, size_t(a.width) * a.height * bytes_of_texel(a.format)) != 0)
+        return false;
+    const size_t cells_at = padded(2 * size_t(a.height));
+    append_environment(scene, emitter, a.height, before->tables.data() + old.env_rows,
+                       cells_at + 4 * size_t(a.width) * a.height);
+    scene.environment_mean = before->environment_mean;
+    return true;
 }
 
 /// Density of an environment map over the cells of 1/width by 1/height in (u,v) (transport/emitter/envmap.h): the
 /// integral of the bilinear interpolant over the cell times the cell's solid angle. Along u, texel centres are cell
 /// centres: weights 1, 6, 1 over 8. Along v, texel rows lie at j/(height-1), so that the weights change from row to
 /// row; a row that barely reaches into a cell still gets 1/32, which bounds the ratio of radiance to density there. The
-/// density is zero only where the radiance is. Returns the mean luminance over the sphere.
-double fill_environment(Scene& scene, Emitter& emitter) {
+/// density is zero only where the radiance is.
+void fill_environment(Scene& scene, Emitter& emitter) {
     const Texture t = scene.textures[size_t(emitter.radiance.texture)];
     const int64_t w = t.width, h = t.height;
     if (w > (1 << 20) || h > (1 << 20))
@@ -154,7 +183,7 @@ double fill_environment(Scene& scene, Emitter& emitter) {
         mean += exact_mean * solid_angle * double(w) / (4 * M_PI);
     }
     append_environment_tables(scene, emitter, t.width, deal_tickets(row_sums), cell_tickets);
-    return mean;
+    scene.environment_mean = mean;
 }
 
 bool is_masked_out(const Scene& scene, const Emitter& e) {
@@ -187,8 +216,8 @@ double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, const Recei
 double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
     return M_PI * to.both_sides * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
-    return M_PI * to.both_sides * fill_environment(scene, e);
+double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter&, const Receivers& to) {
+    return M_PI * to.both_sides * scene.environment_mean;
 }
 
 double power(ModelTag<CollimatedEmitter>, Scene& scene, Emitter& e, const Receivers&) {
@@ -203,7 +232,7 @@ double power(ModelTag<HiddenAreaEmitter>, Scene& scene, Emitter& e, const Receiv
     return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
 
-void fill_emitters(Scene& scene, LightPicking picking) {
+void fill_emitters(Scene& scene, LightPicking picking, const Scene* before) {
     scene.light_picking = name_of(picking);
     scene.emitter_cdf = {0.0f};
     if (scene.emitters.empty()) return;
@@ -211,6 +240,7 @@ void fill_emitters(Scene& scene, LightPicking picking) {
     std::vector<double> powers;
     std::vector<bool> infinite;
     for (Emitter& e : scene.emitters) {
+        if (e.type == EmitterType::envmap && !take_environment(scene, e, before)) fill_environment(scene, e);
         const double p = EmitterModels::visit<EmitterModels::kAll>(
             uint32_t(e.type), 0.0, [&](auto model) { return power(model, scene, e, receivers); });
         if (!(p >= 0) || !std::isfinite(p))
@@ -241,11 +271,15 @@ double filter_cdf(double r, double x) {
     return 0.5 + 0.5 * integral(x) / integral(r);
 }
 
-void fill_filter_table(Scene& scene) {
+void fill_filter_table(Scene& scene, const Scene* before) {
     Sensor& sensor = scene.sensor;
     if (sensor.filter != FilterType::gaussian) return;
     sensor.filter_table = uint32_t(scene.tables.size());
     const double r = sensor.filter_radius;
+    constexpr size_t kSize = 2 * kFilterTableSize + 2;
+    if (before && before->sensor.filter == sensor.filter && before->sensor.filter_radius == sensor.filter_radius)
+        return scene.tables.append(before->tables.data() + before->sensor.filter_table, kSize);
+    std::vector<float> table;
     for (uint32_t i = 0; i <= kFilterTableSize; ++i) {
         const double p = double(i) / kFilterTableSize;
         double lo = -r, hi = r;
@@ -253,14 +287,23 @@ void fill_filter_table(Scene& scene) {
             const double mid = 0.5 * (lo + hi);
             (filter_cdf(r, mid) < p ? lo : hi) = mid;
         }
-        scene.tables.push_back(
+        table.push_back(
             i == 0 ? float(-r)
                    : (i == kFilterTableSize ? float(r) : (2 * i == kFilterTableSize ? 0.0f : float(0.5 * (lo + hi)))));
     }
-    append_filter_guide(scene.tables);
+    append_filter_guide(table);
+    scene.tables.append(table.data(), table.size());
 }
 
-void fill_sort_keys(Scene& scene) {
+Vec3f camera_position(const Scene& scene) { return column(scene.sensor.to_world, 3); }
+
+void fill_sort_keys(Scene& scene, const Scene* before) {
+    const auto has_material = [](const Shape& a, const Shape& b) { return a.material == b.material; };
+    if (before && same_geometry(scene, *before) &&
+        std::equal(scene.shapes.begin(), scene.shapes.end(), before->shapes.begin(), has_material)) {
+        scene.sort_keys = before->sort_keys;
+        return;
+    }
     const SceneView view = scene.view();
     scene.sort_keys.resize(view.primitive_count());
     for (uint32_t prim = 0; prim < view.primitive_count(); ++prim)
@@ -308,13 +351,16 @@ void fill_features(Scene& scene) {
 
 }  // namespace
 
-void finalize_scene(Scene& scene, LightPicking light_picking) {
-    fill_areas(scene);
-    fill_bounds(scene);
-    fill_emitters(scene, light_picking);
-    fill_filter_table(scene);
+void finalize_scene(Scene& scene, LightPicking light_picking, const Scene* before) {
+    fill_areas(scene, before);
+    if (before && same_geometry(scene, *before) && camera_position(scene) == camera_position(*before))
+        scene.bounds_center = before->bounds_center, scene.bounds_radius = before->bounds_radius;
+    else
+        fill_bounds(scene);
+    fill_emitters(scene, light_picking, before);
+    fill_filter_table(scene, before);
     fill_features(scene);
-    fill_sort_keys(scene);
+    fill_sort_keys(scene, before);
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
     // What rays read here and there.
     const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };

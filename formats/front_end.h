@@ -7,9 +7,9 @@
 
 namespace ambilux {
 
-/// The scene of the document that `read` fills, which has the limits of the options.
-Scene load_through(document::Document& document, const std::string& path, const LoadOptions& options,
-                   const std::function<void()>& read);
+/// The scene of the document that `read` fills, which has the limits of the options, and what its edits make of it.
+Scene load_through(const std::shared_ptr<document::Document>& document, const std::string& path,
+                   const LoadOptions& options, const std::function<void()>& read);
 
 /// The scene of the document that `read` fills, for a file at `path`. Meshes without normals stay flat. What is thrown
 /// by `read` and load_document passes through.

@@ -1,6 +1,7 @@
 // Scene files: text and bytes in, a finished scene out.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,11 +11,34 @@
 
 namespace ambilux {
 
+struct Mesh;
+struct Texels;
+
 /// Where loading spends its time, in seconds of the wall clock.
 struct LoadTimes {
     double read = 0;    ///< files: text, meshes and images, with their fingerprints and checks
     double place = 0;   ///< shapes, materials and emitters of what was read, in the coordinates of the scene
     double finish = 0;  ///< finalize_scene(): areas, bounds and tables
+};
+
+namespace document {
+struct Document;
+struct Kept;
+}  // namespace document
+
+/// What a scene was made of, from which edits start (formats/edits.h).
+struct Editable {
+    std::shared_ptr<const document::Document> document;
+    std::shared_ptr<const document::Kept> kept;
+};
+
+/// A change of a scene by name, such as lamp.radiance (docs/python.md): to a text as an attribute of a scene file holds
+/// it ("0.2", "1 0 0"), to an element of Mitsuba's XML, or to an array. Nothing: what holds where the file says
+/// nothing.
+struct Edit {
+    std::string name, text;
+    std::shared_ptr<const Mesh> mesh;
+    std::shared_ptr<const Texels> image;
 };
 
 /// Options of the loader.
@@ -26,6 +50,8 @@ struct LoadOptions {
     Limits limits;
     std::vector<std::string>* files = nullptr;  ///< gets the names of all files that were read
     LoadTimes* times = nullptr;                 ///< how long the parts took is added
+    std::vector<Edit> edits;
+    Editable* editable = nullptr;  ///< gets what edits of this scene start from
 };
 
 /// Loads a scene of any format, by the ending of the file: .pbrt and .pbrt.gz (pbrt-v4), .gltf and .glb (glTF 2.0),

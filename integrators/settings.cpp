@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/nearest.h"
 #include "film/strategy_film.h"
 #include "integrators/registry.h"
 #include "integrators/strategies_setting.h"
@@ -148,8 +149,9 @@ Setting sampler() {
                               "Owen-scrambled Sobol' points (Burley 2020), whose error is known from several seeds "
                               "alone"))
         .limit("sobol", has_sobol, "its kernels have independent numbers alone")
-        .not_with_auto("its pilot predicts for independent numbers; render with the settings that it chooses and this "
-                       "one")
+        .not_with_auto(
+            "its pilot predicts for independent numbers; render with the settings that it chooses and this "
+            "one")
         .image_attribute();
 }
 
@@ -249,11 +251,14 @@ const Setting* find_setting(const std::string& key) {
 }
 
 [[noreturn]] void refuse_key(const std::string& key) {
-    std::vector<std::string> known;
+    Names known;
     for (const Setting& s : general_settings()) known.push_back(s.what.key);
     for (const Variant& v : variants())
-        for (const Setting& s : v.own) known.push_back(fmt::format("{} ({})", s.what.key, v.name()));
-    throw Error(ExitCode::usage, fmt::format("unknown setting '{}': known are {}", key, fmt::join(known, ", ")));
+        for (const Setting& s : v.own) known.push_back(s.what.key);
+    const std::string near = nearest_name(known, key);
+    throw Error(ExitCode::usage,
+                fmt::format("unknown setting '{}': {}", key,
+                            near.empty() ? "`ambilux help settings` lists them" : fmt::format("is '{}' meant?", near)));
 }
 
 }  // namespace

@@ -30,6 +30,8 @@ public:
     }
     std::function<FilmMoments()> take_film() override { return drop(), renderer_->take_film(); }
     std::optional<DeviceImage> device_image() override { return drop(), renderer_->device_image(); }
+    ByteImage picture(float stops) override { return drop(), renderer_->picture(stops); }
+    void give_up_when(const volatile bool* flag) override { renderer_->give_up_when(flag); }
     uint32_t ready() const override { return ready_; }
     RenderStats stats() override {
         RenderStats s = renderer_->stats();

@@ -95,8 +95,19 @@ public:
     }
     uint64_t peak_bytes() const { return peak_; }
 
+    /// With the scene's sensor, and without what was counted.
+    void begin_anew() {
+        maker_.view.sensor = maker_.scene.sensor;
+        const uint64_t held = held_ - planned_wave_bytes();
+        waves_.clear();
+        allocate_waves(held);
+    }
+
     // ---- rendering ----
 
+    void give_up_when(const volatile bool* flag) { give_up_ = flag; }
+    /// Waves were left out since it was asked to.
+    bool gave_up() const { return is_set(give_up_); }
     /// Samples to render before clocks and signals are looked at again, at most `batch`.
     uint32_t pass(uint32_t batch, const volatile bool*, uint64_t) const {
         return Maker::kFilmWide ? uint32_t(maker_.plan.film_wave.samples) : batch;
@@ -157,7 +168,9 @@ private:
             ++phase;
             const Wave& wave = backend.maker_.plan.wave;
             const uint32_t parts = (tile_count(wave) + wave.tiles - 1) / wave.tiles;
-            parallel_for(parts, [&](uint32_t p) { run({p * wave.tiles, wave.tiles, first, count}, body); });
+            parallel_for(parts, [&](uint32_t p) {
+                if (!backend.gave_up()) run({p * wave.tiles, wave.tiles, first, count}, body);
+            });
             while (!failed.empty()) {
                 backend.grow(state);
                 const std::vector<Part> again = std::exchange(failed, {});
@@ -306,6 +319,7 @@ private:
     std::shared_ptr<const LightTree> light_tree_;  ///< Features::light_tree only
     std::vector<OwnWave> waves_;
     WaveState film_state_{};
+    const volatile bool* give_up_ = nullptr;
     std::atomic<uint64_t> held_ = 0, peak_ = 0;  ///< bytes, by all waves and all else
     uint64_t accel_bytes_ = 0;
 };

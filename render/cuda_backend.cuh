@@ -7,9 +7,11 @@
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda/handles.h"
 #include "backends/cuda/mean_on_device.h"
+#include "backends/cuda/picture_on_device.h"
 #include "backends/cuda_device.h"
 #include "backends/fusion.h"
 #include "core/flag.h"
+#include "core/seconds.h"
 #include "render/state_memory.h"
 
 namespace ambilux {
@@ -65,8 +67,8 @@ public:
         return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) +
                (light_tree_ ? light_tree_->bytes() : 0);
     }
-    /// A clock, and an image that may be asked for.
-    uint64_t other_bytes() const { return sizeof(uint64_t) + image_bytes(); }
+    /// A clock, and an image and pictures that may be asked for.
+    uint64_t other_bytes() const { return sizeof(uint64_t) + image_bytes() + PicturesOnDevice::kBytes; }
     uint64_t waves() const { return 1; }
     /// For film and waves: of what is free, and of what is left of a budget beside `held` bytes.
     uint64_t room(uint64_t held) const {
@@ -97,8 +99,19 @@ public:
         return mean_on_device(sum, maker_.plan.wave.width, maker_.plan.wave.height, samples);
     }
 
+    ByteImage picture(const double* sum, uint64_t samples, float stops) {
+        return pictures_.make(sum, maker_.plan.wave.width, maker_.plan.wave.height, samples, stops);
+    }
+    /// With the scene's sensor, and without what was counted.
+    void begin_anew() {
+        maker_.view.sensor = maker_.scene.sensor;
+        allocate_queues();
+    }
+
     // ---- rendering ----
 
+    /// What is launched is finished.
+    bool gave_up() const { return false; }
     /// Samples to render before clocks and signals are looked at again, at most `batch`, after `done`. All waves of a
     /// pass are queued at once. Of parts of the film, those of one sample: behind one that failed, those of the next
     /// sample would overwrite what is done of this one.
@@ -128,6 +141,8 @@ public:
     }
 
     void fill(RenderStats& stats) {
+        stats.device_seconds = cuda_start_seconds();
+        stats.kernel_seconds = kernel_seconds_;
         if (memory_.bytes() > 0) read_counts();
         fill_stage_stats(layout_.record_names(), records_, stats);
         fill_queue_stats(layout_, {counters_.data()}, stats);
@@ -282,7 +297,10 @@ private:
         Layout dry;
         const uint32_t kept = maker_.plan.kept();
         maker_.lay_out(dry, wave_, kept);
-        memory_ = DeviceMemory(dry.bytes(), "queues");
+        if (memory_.bytes() == dry.bytes())
+            DeviceMemory::clear(memory_.data(), memory_.bytes());
+        else
+            memory_ = DeviceMemory(dry.bytes(), "queues");
         peak_ = std::max(peak_, held_ + held_bytes(0) - other_bytes());
         layout_ = Layout(dry, memory_.data());
         stages_.emplace(maker_.lay_out(layout_, wave_, kept));
@@ -294,12 +312,14 @@ private:
         if constexpr (!Maker::kFilmWide)
             if (pairs_) executor_->use(pairs_->tracer());
         phases_.clear();
+        const auto start = Clock::now();
         if (maker_.settings.graph) {
             Capture capture = {*this};
             run_iteration<Integrator>(capture);
         }
         wait_for_default_stream("preparation");
         cuda_check(cudaStreamSynchronize(stream_.get()), "preparation");
+        if (kernel_seconds_ == 0 && maker_.settings.graph) kernel_seconds_ = seconds_since(start);
     }
     /// A wave had more than there was capacity for. Where there is no memory for more light vertices, waves get
     /// smaller.
@@ -356,10 +376,12 @@ private:
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow
     std::vector<QueueCounter> counters_;  ///< likewise
     DeviceBuffer<uint64_t> clock_;
+    PicturesOnDevice pictures_;
     Owned<cudaStream_t> stream_;
     std::optional<Stages> stages_;
     std::optional<Exec> executor_;
     std::vector<Phase> phases_;
+    double kernel_seconds_ = 0;  ///< loaded or compiled, and made graphs of
 };
 
 }  // namespace ambilux

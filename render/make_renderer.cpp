@@ -1,7 +1,12 @@
 #include <fmt/format.h>
 
+#include <cstdlib>
+#include <mutex>
+#include <set>
+
 #include "backends/cuda_device.h"
 #include "core/error.h"
+#include "core/log.h"
 #include "integrators/registry.h"
 #include "render/make_on_backend.h"
 #include "render/selection.h"
@@ -20,6 +25,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
         s.queues.ordering = cuda && variant.traits.sorts && several_bsdfs ? Ordering::material : Ordering::none;
     s.queues.keyed_hits =
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several_bsdfs;
+    if (cuda && !cuda_graphs_choose()) s.graph = false;
     if (s.draws == CacheDraws::automatic && variant.traits.draws_together)
         s.draws = cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;
@@ -42,9 +48,32 @@ CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderS
                                                                  : "All"));
 }
 
+/// What a first start waits for, once for each variant. Only the kernels of this variant and level are loaded, and so
+/// compiled. True if there is something to wait for.
+bool announce_kernels(const RenderSettings& s) {
+    const KernelChoice kernels = cuda_kernels();
+    static std::set<std::string> announced;
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    const std::string name = variant_of(s).name();
+    if (kernels.kind != KernelKind::ptx || !announced.insert(name).second) return false;
+    const char *disabled = std::getenv("CUDA_CACHE_DISABLE"), *path = std::getenv("CUDA_CACHE_PATH");
+    const std::string kept = disabled && std::string(disabled) == "1"
+                                 ? "and again at every start, since CUDA_CACHE_DISABLE is set"
+                                 : fmt::format("once: it keeps them in {}", path ? path : "~/.nv/ComputeCache");
+    log_info(fmt::format("{}: the driver compiles kernels for this device from {}. That takes up to a minute, {}", name,
+                         kernels_text(kernels), kept));
+    return true;
+}
+
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
     if (cuda && !cuda_device_present()) throw Error(ExitCode::device, why_no_cuda_device());
-    return compiled_for(cuda, scene, s)(scene, s, accels);
+    const auto make = compiled_for(cuda, scene, s);
+    const bool waits = cuda && announce_kernels(s);
+    std::unique_ptr<Renderer> renderer = make(scene, s, accels);
+    if (const double seconds = waits ? renderer->stats().kernel_seconds : 0; seconds > 0)
+        log_info(fmt::format("{}: its kernels were there after {:.1f} s", variant_of(s).name(), seconds));
+    return renderer;
 }
 
 std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {

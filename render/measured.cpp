@@ -51,9 +51,7 @@ Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint3
 }
 
 double measured_ratio(const Measured& a, const Measured& b) {
-    Pilot both;
-    both.variance = {a.variance, b.variance};
-    const std::vector<double> variance = selection_variances(both);
+    const std::vector<double> variance = trimmed_means({a.variance, b.variance});
     return variance[1] * b.seconds / (variance[0] * a.seconds);
 }
 

@@ -15,7 +15,7 @@ struct Measured {
 /// From sample `first` on; the first of them bears what later ones do not and counts for no time.
 Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint32_t first);
 
-/// Product of variance and time of b over that of a; blocks are left out as selection_variances does.
+/// Product of variance and time of b over that of a; the worst blocks are left out (trimmed_means).
 double measured_ratio(const Measured& a, const Measured& b);
 
 }  // namespace ambilux

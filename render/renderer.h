@@ -12,6 +12,7 @@
 
 #include "film/device_image.h"
 #include "film/moments.h"
+#include "film/tone.h"
 #include "integrators/settings.h"
 #include "integrators/state_kind.h"
 #include "scene/scene.h"
@@ -61,10 +62,12 @@ struct SelectionStats {
 struct RenderStats {
     std::string backend, device, accel;
     RenderSettings settings;    ///< as used: bdpt.auto has chosen some of them, and others were left open
-    double build_seconds = 0;   ///< acceleration structure, upload, allocation
-    double render_seconds = 0;  ///< inside render(), wall clock
-    uint64_t samples = 0;       ///< per pixel
-    uint32_t wave_paths = 0;    ///< in flight at once in a wave (on a CPU each thread has one); 0: no waves
+    double device_seconds = 0;  ///< driver and context, when this process first looked for a device; not in `build`
+    double build_seconds = 0;   ///< acceleration structure, upload, allocation, kernels
+    double structure_seconds = 0, kernel_seconds = 0;  ///< parts of it; with graph=false kernels are part of render
+    double render_seconds = 0;                         ///< inside render(), wall clock
+    uint64_t samples = 0;                              ///< per pixel
+    uint32_t wave_paths = 0;  ///< in flight at once in a wave (on a CPU each thread has one); 0: no waves
     uint64_t rays_extend = 0, rays_occlude = 0;
     std::vector<StageStats> stages;
     std::vector<QueueStats> queues;
@@ -106,6 +109,18 @@ public:
     }
     /// Means of the same samples without a way over the host; nothing where the film lies on the host.
     virtual std::optional<DeviceImage> device_image() { return std::nullopt; }
+    /// What is to be seen of them: means times 2^stops. Of a film on a device it is made there, and the bytes alone
+    /// come to the host.
+    virtual ByteImage picture(float stops) {
+        const FilmMoments film = this->film();
+        return tone_mapped(film.sum.data(), film.width, film.height, film.samples, stops);
+    }
+    /// Begins anew, statistics too, with the scene's sensor, which has changed in place but for its size. False, and
+    /// nothing done, where that takes another renderer.
+    virtual bool move_camera() { return false; }
+    /// From now on render() may leave a sample unfinished once *flag is true. It returns fewer samples then, and the
+    /// film is lost: only move_camera() makes another.
+    virtual void give_up_when(const volatile bool* /*flag*/) {}
     /// Samples that were rendered while the renderer was made: a first call of render(0, count) with at least so many
     /// adds them at no cost.
     virtual uint32_t ready() const { return 0; }

@@ -3,37 +3,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
-#include <thread>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "backends/cuda_device.h"
 #include "core/error.h"
-#include "core/flag.h"
+#include "core/seconds.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
 #include "render/chosen.h"
+#include "render/head_start.h"
 #include "render/measured.h"
 
 namespace ambilux {
 namespace {
 
-/// Pilots: a few hundredths of the shortest renders that are worth a selection, on 2 cores and on the 16 beside a GPU.
-/// With half of the latter, one seed in ten (water-caustic) or two (veach-ajar) put a candidate first that is 1.1
-/// to 1.5 times worse.
-constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
+/// What every candidate has beside the variance that a pilot sees, in multiples of the median candidate's: fitted to
+/// the project's own scenes (docs/lab/2026-11-28-regret.md).
+constexpr double kUnseen = 0.2;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::string joined(const SettingTexts& settings) {
     std::string text;
@@ -62,6 +57,21 @@ SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, fl
     }
     c.offer = std::move(offer);
     return c;
+}
+
+/// Eye subpaths of a pilot: a few hundredths of the time of a render that ends by the clock, on 2 cores and on the 16
+/// beside a GPU. With half of the most for a device, one seed in ten (water-caustic) or two (veach-ajar) put a
+/// candidate first that is 1.1 to 1.5 times worse.
+uint32_t pilot_samples(const RenderSettings& settings, bool cuda) {
+    const double most = cuda ? 32768 : 8192, for_seconds = cuda ? 2 : 4, least = 4096;
+    if (settings.expected_samples > 0 || !(settings.expected_seconds > 0)) return uint32_t(most);
+    return uint32_t(std::clamp(most * settings.expected_seconds / for_seconds, least, most));
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
 }
 
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
@@ -97,55 +107,6 @@ double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeR
     return seconds_of(kFirstTimedSample + 1, count) / count;
 }
 
-/// The path tracer of a device, which has nothing else to do while the host runs the pilot. Its samples are those that
-/// the render begins with if it is chosen: the pilot, on which that depends, has random numbers of its own. Otherwise
-/// they are dropped. For renders that end by the clock: others gain nothing.
-class HeadStart {
-public:
-    HeadStart(const RenderSettings& settings, const MakeRenderer& make)
-        : thread_([this, settings, &make] {
-              try {
-                  const auto start = Clock::now();
-                  renderer_ = make(settings);
-                  build_seconds_ = seconds_since(start);
-                  run();
-              } catch (const std::exception&) {
-                  samples_ = 0;
-                  renderer_.reset();  // it is tried again, and complains, if it is chosen
-              }
-          }) {}
-    ~HeadStart() { stop(); }
-
-    void stop() {
-        set_flag(&stop_);
-        if (thread_.joinable()) thread_.join();
-    }
-    uint32_t samples() const { return samples_; }
-    double build_seconds() const { return build_seconds_; }
-    /// Of every pixel, while there was nothing else to do; 0: unknown.
-    double seconds_per_sample() const { return seconds_per_sample_; }
-    std::unique_ptr<Renderer> take() { return std::move(renderer_); }
-
-private:
-    void run() {
-        constexpr double kBatchSeconds = 0.008;  // which the host may have to wait for
-        for (uint32_t batch = 1; samples_ == 0 || !is_set(&stop_);) {
-            const auto start = Clock::now();
-            samples_ += renderer_->render(samples_, batch);
-            const double seconds = seconds_since(start);
-            if (seconds > 0.5 * kBatchSeconds && samples_ > batch)
-                seconds_per_sample_ = seconds / batch;  // the first bears what later ones do not
-            batch = std::clamp(uint32_t(kBatchSeconds / seconds * batch), 1u, 4 * batch);
-        }
-    }
-
-    volatile bool stop_ = false;
-    uint32_t samples_ = 0;
-    double build_seconds_ = 0, seconds_per_sample_ = 0;
-    std::unique_ptr<Renderer> renderer_;
-    std::thread thread_;
-};
-
 }  // namespace
 
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda) {
@@ -180,22 +141,29 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     return bidirectional * work;
 }
 
-std::vector<double> selection_variances(const Pilot& pilot) {
-    const size_t blocks = pilot.variance[0].size();
+std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance) {
+    const size_t blocks = variance[0].size();
     std::vector<std::pair<double, size_t>> worst(blocks);
     for (size_t b = 0; b < blocks; ++b) {
         worst[b] = {kInfinity, b};
-        for (const std::vector<double>& of : pilot.variance) worst[b].first = std::min(worst[b].first, of[b]);
+        for (const std::vector<double>& of : variance) worst[b].first = std::min(worst[b].first, of[b]);
     }
     std::sort(worst.begin(), worst.end());
     const size_t kept = blocks - size_t(kTrimmedBlocks * double(blocks));
-    std::vector<double> variances;
-    for (size_t c = 0; c < pilot.variance.size(); ++c) {
+    std::vector<double> means;
+    for (const std::vector<double>& of : variance) {
         double sum = 0;
-        for (size_t i = 0; i < kept; ++i) sum += pilot.variance[c][worst[i].second];
-        variances.push_back(std::max(sum / double(kept), 1e-12));
+        for (size_t i = 0; i < kept; ++i) sum += of[worst[i].second];
+        means.push_back(std::max(sum / double(kept), 1e-12));
     }
-    return variances;
+    return means;
+}
+
+std::vector<double> selection_variances(const Pilot& pilot) {
+    std::vector<double> means = trimmed_means(pilot.variance);
+    const double unseen = kUnseen * median(means);
+    for (double& mean : means) mean += unseen;
+    return means;
 }
 
 namespace {
@@ -224,7 +192,7 @@ public:
         for (const SelectionCandidate& c : candidates_)
             if (!c.offer.measured) predicted.push_back(c.pilot);
         const Pilot pilot =
-            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
+            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, pilot_samples(settings_, cuda_));
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
         variance_.resize(candidates_.size(), double(kInfinity));

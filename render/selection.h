@@ -21,8 +21,13 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
 /// The rays and connections of one sample of a pixel, in multiples of one ray of a path tracer.
 double selection_work(const PilotWork& work, const SelectionCandidate& candidate, bool cuda);
 
-/// The variance of one sample, mean over the blocks but for the share that is worst for the best candidate of each:
-/// what lies in a few pixels is not trimmed away by chance for some candidates only.
+/// Mean over the blocks of a film of each candidate's variance, `variance[candidate][block]`, but for the hundredth of
+/// the blocks that is worst for the best candidate of each: what lies in a few pixels is not trimmed away by chance for
+/// some candidates only.
+std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance);
+
+/// The variance of one sample that each candidate is selected by: the trimmed mean, and what no pilot sees, which is
+/// the same for all per eye subpath.
 std::vector<double> selection_variances(const Pilot& pilot);
 
 /// Makes a renderer of given settings, which are not automatic.

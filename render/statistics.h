@@ -1,18 +1,14 @@
 // From the records that stages keep to the statistics of a render.
 #pragma once
 
-#include <chrono>
+#include <string>
 #include <vector>
 
+#include "core/seconds.h"
 #include "queues/layout.h"
 #include "render/renderer.h"
 
 namespace ambilux {
-
-using Clock = std::chrono::steady_clock;
-inline double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Fills stages, rays and invalid counts from one record for each name. Stages that did nothing are left out; the
 /// others stand in the order of a wave: light subpaths, eye subpaths, connections, mis_weight to update_film.

@@ -23,6 +23,7 @@ public:
         const auto start = Clock::now();
         try {
             const HostTracer tracer = backend_.find_structure(accels);
+            structure_seconds_ = seconds_since(start);
             if constexpr (requires { Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed); })
                 maker_.plan.mean = Integrator::pilot(maker_.policy, maker_.view, tracer, settings.seed);
             plan_.choose_iterations([&] {
@@ -54,6 +55,7 @@ public:
             const auto pass_start = Clock::now();
             film_is_whole_ = false;
             const uint32_t finished = backend_.run(first + done, pass, state_);
+            if (backend_.gave_up()) break;
             film_is_whole_ = true;
             samples_ += finished;
             film_samples_ += finished;
@@ -92,6 +94,27 @@ public:
         }
     }
 
+    ByteImage picture(float stops) override {
+        check_film();
+        const Wave& w = plan_.wave;
+        if constexpr (Backend::kHost)
+            return tone_mapped(film_.sums.sum, w.width, w.height, film_samples_, stops);
+        else
+            return backend_.picture(film_.sums.sum, film_samples_, stops);
+    }
+    bool move_camera() override {
+        if constexpr (State::kKind != StateKind::none) return false;
+        backend_.begin_anew();
+        Memory::clear(film_memory_.data(), film_memory_.bytes());
+        samples_ = film_samples_ = measured_samples_ = 0;
+        render_seconds_ = measured_seconds_ = 0;
+        film_is_whole_ = true;
+        return true;
+    }
+    void give_up_when(const volatile bool* flag) override {
+        if constexpr (Backend::kHost) backend_.give_up_when(flag);
+    }
+
     StateKind state_kind() const override { return State::kKind; }
     std::vector<std::byte> save_state() override { return state_.save(); }
     void load_state(std::span<const std::byte> saved) override { state_.load(saved); }
@@ -106,6 +129,7 @@ public:
         s.accel = backend_.accel();
         s.settings = maker_.settings;
         s.build_seconds = build_seconds_;
+        s.structure_seconds = structure_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
         s.wave_paths = maker_.policy.waves.order_slots(plan_.wave.slot_count());
@@ -228,7 +252,7 @@ private:
     StateMemory<Memory, Maker> state_{maker_};
     bool film_is_whole_ = true;
     uint64_t samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
-    double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
+    double build_seconds_ = 0, structure_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
 };
 
 }  // namespace ambilux

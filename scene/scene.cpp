@@ -36,6 +36,11 @@ SceneView Scene::view() const {
     return v;
 }
 
+bool same_geometry(const Scene& a, const Scene& b) {
+    return same_array(a.vertices, b.vertices) && same_array(a.triangles, b.triangles) &&
+           same_array(a.quadrics, b.quadrics) && same_array(a.instances, b.instances);
+}
+
 uint64_t Scene::memory_bytes() const {
     const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
     return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(groups) + bytes(instances) + bytes(shapes) +

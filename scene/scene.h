@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/shared_array.h"
 #include "scene/view.h"
 
 namespace ambilux {
@@ -19,6 +20,7 @@ struct IntegratorHint {
     bool hide_emitters = false;
 };
 
+/// Copies share the large arrays.
 struct Scene {
     std::string path;  ///< file it came from
     /// Coordinates of the file that are this scene's (0,0,0). The loader moves scenes that lie far from the origin of
@@ -33,21 +35,22 @@ struct Scene {
     std::string light_picking = "power";  ///< how next event estimation and light subpaths choose an emitter; tree: by
                                           ///< power, and renders shall have light_picking=tree
 
-    std::vector<MeshVertex> vertices;
-    std::vector<Triangle> triangles;
-    std::vector<Quadric> quadrics;
+    SharedArray<MeshVertex> vertices;
+    SharedArray<Triangle> triangles;
+    SharedArray<Quadric> quadrics;
     std::vector<Group> groups;  ///< in the order of their triangles, which are the last ones
-    std::vector<Instance> instances;
+    SharedArray<Instance> instances;
     std::vector<Shape> shapes;
     std::vector<Material> materials;
     std::vector<BsdfRecord> bsdfs;
     std::vector<Texture> textures;
-    std::vector<uint8_t> texels;
+    SharedArray<uint8_t> texels;
     std::vector<uint16_t> sort_keys;  ///< per primitive (SceneView::sort_keys)
     std::vector<Emitter> emitters;
     std::vector<float> emitter_cdf;
-    std::vector<float> tables;
+    SharedArray<float> tables;
     uint32_t environment = kNone;
+    double environment_mean = 0;  ///< luminance of an environment map over the sphere, its factor included
     Vec3f bounds_center{};
     float bounds_radius = 0;
     Sensor sensor{};
@@ -58,5 +61,8 @@ struct Scene {
     /// Bytes of all arrays.
     uint64_t memory_bytes() const;
 };
+
+/// Whether both have the same shapes in the same memory.
+bool same_geometry(const Scene& a, const Scene& b);
 
 }  // namespace ambilux

@@ -3,11 +3,11 @@
 # does not bring and their licences, tries it in a fresh environment, and puts it into dist/.
 #   scripts/wheel.sh                    CPU only
 #   AMBILUX_CUDA=ON scripts/wheel.sh    with CUDA kernels; the driver is looked for when they are to run. They are for devices of
-#                                       compute capability 9.0 and, by PTX, newer ones: AMBILUX_CUDA_ARCHITECTURES='80;90' for more
+#                                       compute capability 8.0 and newer; AMBILUX_CUDA_ARCHITECTURES=90 compiles those of one
 # It runs on x86-64 Linux with AVX2, the same version of Python and a glibc as new as this machine's.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh
-most_mb=60
+most_mb=100
 work="$root/build-wheel/package"
 rm -rf "$work/out" "$work/licences"
 mkdir -p "$work/out" "$work/licences" dist
@@ -18,7 +18,7 @@ fi
 tools="$work/tools/bin"
 
 CMAKE_BUILD_PARALLEL_LEVEL=$(jobs) python3 -m pip wheel --quiet --disable-pip-version-check --no-deps . -w "$work/out" \
-  -Cbuild-dir="$root/build-wheel" -Ccmake.define.AMBILUX_CUDA_ARCHITECTURES="${AMBILUX_CUDA_ARCHITECTURES:-90}" \
+  -Cbuild-dir="$root/build-wheel" -Ccmake.define.AMBILUX_CUDA_ARCHITECTURES="${AMBILUX_CUDA_ARCHITECTURES:-every}" \
   -Ccmake.define.AMBILUX_CUDA_SMALL=ON
 built=("$work"/out/ambilux-*.whl)
 PATH="$tools:$PATH" "$tools/auditwheel" repair --exclude 'libcuda.so.*' -w "$work/out/repaired" "${built[0]}"
@@ -43,7 +43,7 @@ size=$(stat -c %s "$wheel")
 # In an environment that has nothing else, away from the checkout.
 python3 -m venv --clear "$work/fresh"
 "$work/fresh/bin/python" -m pip install --quiet --disable-pip-version-check "$wheel"
-(cd "$work" && "$work/fresh/bin/ambilux" --version &&
+(cd "$work" && "$work/fresh/bin/ambilux" --version &&  # with devices, and the kernels that they get
   "$work/fresh/bin/ambilux" render "$root/scenes/cornell.xml" -o "$work/out/first.exr" --size 64x64 --spp 4 --backend cpu &&
   "$work/fresh/bin/python" -c '
 import ambilux, sys

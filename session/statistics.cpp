@@ -103,6 +103,15 @@ static const char* errors_from(const RenderSettings& used) {
     return used.sampler == Sampler::sobol ? "seeds" : "samples";
 }
 
+nlohmann::json seconds_json(const RenderStats& stats, double load_seconds) {
+    return {{"load", load_seconds},
+            {"device", stats.device_seconds},
+            {"build", stats.build_seconds},
+            {"structure", stats.structure_seconds},
+            {"kernels", stats.kernel_seconds},
+            {"render", stats.render_seconds}};
+}
+
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const RenderStats& stats,
                           double load_seconds) {
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
@@ -120,35 +129,34 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
     const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
     const RenderSettings used = used_settings(asked, stats);
     nlohmann::json json = settings_json(used);
-    json.update(
-        {{"asked", settings_json(asked)},
-         {"method", method_text(used)},
-         {"bias", bias_text(used)},
-         {"errors_from", errors_from(used)},
-         {"scene", scene.path},
-         {"scene_hash", scene_hash(scene)},
-         {"warnings", scene.warnings},
-         {"backend", stats.backend},
-         {"device", stats.device},
-         {"accel", stats.accel},
-         {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
-         {"light_picking", light_picking_text(scene, used)},
-         {"spp", stats.samples},
-         {"wave_paths", stats.wave_paths},
-         {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
-         {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
-         {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},
-         {"stages", stages},
-         {"queues", queues},
-         {"invalid", invalid},
-         {"memory_bytes", stats.memory_bytes},
-         {"memory_bytes_predicted", stats.memory_bytes_predicted},
-         {"memory_bytes_peak", stats.memory_bytes_peak},
-         {"features", stats.features},
-         {"skipped", stats.skipped},
-         {"selection", selection_json(stats.selection)},
-         {"version", version()},
-         {"git_revision", git_revision()}});
+    json.update({{"asked", settings_json(asked)},
+                 {"method", method_text(used)},
+                 {"bias", bias_text(used)},
+                 {"errors_from", errors_from(used)},
+                 {"scene", scene.path},
+                 {"scene_hash", scene_hash(scene)},
+                 {"warnings", scene.warnings},
+                 {"backend", stats.backend},
+                 {"device", stats.device},
+                 {"accel", stats.accel},
+                 {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
+                 {"light_picking", light_picking_text(scene, used)},
+                 {"spp", stats.samples},
+                 {"wave_paths", stats.wave_paths},
+                 {"seconds", seconds_json(stats, load_seconds)},
+                 {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
+                 {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},
+                 {"stages", stages},
+                 {"queues", queues},
+                 {"invalid", invalid},
+                 {"memory_bytes", stats.memory_bytes},
+                 {"memory_bytes_predicted", stats.memory_bytes_predicted},
+                 {"memory_bytes_peak", stats.memory_bytes_peak},
+                 {"features", stats.features},
+                 {"skipped", stats.skipped},
+                 {"selection", selection_json(stats.selection)},
+                 {"version", version()},
+                 {"git_revision", git_revision()}});
     return json;
 }
 

@@ -22,9 +22,12 @@ std::string method_text(const RenderSettings& used);
 /// All settings by key (integrators/settings.cpp), and those of the variant's own.
 nlohmann::json settings_json(const RenderSettings& settings);
 
+/// What a start and a render took: load, device (driver and context), build, and of it structure and kernels; render.
+nlohmann::json seconds_json(const RenderStats& stats, double load_seconds);
+
 /// The statistics of a render: the settings as used and, under `asked`, as asked for; scene, backend, device, size,
-/// spp, seconds {load, build, render}, rays {extend, occlude}, stages, queues, invalid, memory_bytes, features,
-/// skipped, version and more.
+/// spp, seconds (seconds_json), rays {extend, occlude}, stages, queues, invalid, memory_bytes, features, skipped,
+/// version and more.
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
                           double load_seconds);
 

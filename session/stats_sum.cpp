@@ -10,6 +10,9 @@
 namespace ambilux {
 namespace {
 
+constexpr double RenderStats::* kBuildTimes[] = {&RenderStats::device_seconds, &RenderStats::build_seconds,
+                                                 &RenderStats::structure_seconds, &RenderStats::kernel_seconds};
+
 template <class Item>
 const Item* named(const std::vector<Item>& items, const std::string& name) {
     const auto found = std::find_if(items.begin(), items.end(), [&](const Item& item) { return item.name == name; });
@@ -115,7 +118,7 @@ RenderStats sum_of_devices(RenderStats sum, const std::vector<std::pair<std::str
         together.memory_bytes += stats.memory_bytes;
         together.memory_bytes_predicted += stats.memory_bytes_predicted;
         together.memory_bytes_peak += stats.memory_bytes_peak;
-        together.build_seconds = std::max(together.build_seconds, stats.build_seconds);
+        for (double RenderStats::* part : kBuildTimes) together.*part = std::max(together.*part, stats.*part);
         ++names[host + ": " + stats.device];
     }
     sum.device.clear();
@@ -126,7 +129,7 @@ RenderStats sum_of_devices(RenderStats sum, const std::vector<std::pair<std::str
     sum.memory_bytes = together.memory_bytes;
     sum.memory_bytes_predicted = together.memory_bytes_predicted;
     sum.memory_bytes_peak = together.memory_bytes_peak;
-    sum.build_seconds = together.build_seconds;
+    for (double RenderStats::* part : kBuildTimes) sum.*part = together.*part;
     return sum;
 }
 
@@ -142,6 +145,7 @@ nlohmann::json save_stats(const RenderStats& s) {
             {"accel", s.accel},
             {"settings", save(s.settings)},
             {"build_seconds", s.build_seconds},
+            {"build_parts", {s.device_seconds, s.structure_seconds, s.kernel_seconds}},
             {"render_seconds", s.render_seconds},
             {"samples", s.samples},
             {"wave_paths", s.wave_paths},
@@ -163,6 +167,11 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.accel = j.at("accel");
     for (const auto& setting : j.at("settings")) apply_setting(s.settings, setting.at(0), setting.at(1));
     s.build_seconds = j.at("build_seconds");
+    if (j.contains("build_parts")) {  // states of older versions lack them
+        s.device_seconds = j["build_parts"].at(0);
+        s.structure_seconds = j["build_parts"].at(1);
+        s.kernel_seconds = j["build_parts"].at(2);
+    }
     s.render_seconds = j.at("render_seconds");
     s.samples = j.at("samples");
     s.wave_paths = j.value("wave_paths", 0u);  // states of older versions lack it

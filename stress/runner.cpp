@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/progress.h"
@@ -46,7 +47,7 @@ std::vector<const Method*> chosen_methods(const std::vector<std::string>& names,
 std::string backend_of(const std::string& name) {
     const Choice<Backend> backend(name);
     if (backend == Backend::automatic) return cuda_available() ? "cuda" : "cpu";
-    if (backend == Backend::cuda && !cuda_available()) throw Error(ExitCode::device, "stress: there is no CUDA device");
+    if (backend == Backend::cuda && !cuda_available()) throw Error(ExitCode::device, "stress: " + why_no_cuda_device());
     return name;
 }
 

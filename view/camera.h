@@ -7,6 +7,8 @@ namespace ambilux {
 
 struct LookAt {
     Vec3f origin, target, up;
+
+    bool operator==(const LookAt&) const = default;
 };
 
 /// Where `sensor` stands. The target lies as far away as the centre of the scene's bounds, where that is in front.

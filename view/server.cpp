@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 #include <httplib.h>
 
+#include <algorithm>
+#include <cstdlib>
+
 #include "core/error.h"
 #include "core/flag.h"
+#include "core/seconds.h"
+#include "formats/images/jpeg_write.h"
 #include "view/page.h"
 
 namespace ambilux {
@@ -12,7 +17,8 @@ namespace {
 
 constexpr std::chrono::seconds kPatience(5);
 constexpr std::chrono::milliseconds kLookPeriod(100);
-constexpr size_t kLargestRequest = 1 << 16;
+constexpr size_t kLargestRequest = 1 << 16, kRequestsPerConnection = 1 << 30;
+constexpr int kQuality = 90;
 
 std::string text_of(const nlohmann::json& json) {
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -23,19 +29,50 @@ Vec3f vector_of(const nlohmann::json& json) {
     return {v[0], v[1], v[2]};
 }
 
-/// Length of the facts in bytes, facts as JSON, pixels.
-std::string body_of(const Picture& picture) {
-    nlohmann::json facts = picture.facts;
-    facts["frame"] = picture.number;
-    facts["width"] = picture.width;
-    facts["height"] = picture.height;
-    std::string text = text_of(facts);
-    text.resize((text.size() + 3) / 4 * 4, ' ');
+/// What is sent of a picture: length of the facts in bytes, facts as JSON, and pixels.
+struct Sent {
+    SharedPicture picture;
+    std::string head, jpeg;  ///< of the two kinds of pixels, those of the picture if there is no JPEG
+
+    std::string_view pixels() const {
+        if (!jpeg.empty()) return jpeg;
+        return {reinterpret_cast<const char*>(picture->image.rgb.get()), picture->image.bytes()};
+    }
+};
+
+std::shared_ptr<const Sent> sent_of(const SharedPicture& picture, const httplib::Request& q) {
+    auto sent = std::make_shared<Sent>(Sent{picture, {}, {}});
+    const ByteImage& image = picture->image;
+    nlohmann::json facts = picture->facts;
+    facts["frame"] = picture->number;
+    facts["width"] = image.width;
+    facts["height"] = image.height;
+    facts["format"] = "rgb";
+    if (q.get_param_value("as") == "jpeg" && image.bytes() && std::max(image.width, image.height) <= kLargestJpeg) {
+        const int quality = q.has_param("quality") ? std::atoi(q.get_param_value("quality").c_str()) : kQuality;
+        const auto start = Clock::now();
+        sent->jpeg = jpeg_bytes(image.width, image.height, image.rgb.get(), quality);
+        facts["format"] = "jpeg";
+        facts["picture_seconds"]["jpeg"] = seconds_since(start);
+    }
+    const std::string text = text_of(facts);
     const auto size = uint32_t(text.size());
-    std::string body(reinterpret_cast<const char*>(&size), sizeof(size));
-    body += text;
-    body.append(reinterpret_cast<const char*>(picture.rgba.data()), picture.rgba.size());
-    return body;
+    sent->head.assign(reinterpret_cast<const char*>(&size), sizeof(size));
+    sent->head += text;
+    return sent;
+}
+
+/// Head and pixels lie where they are until the socket has them.
+void answer_with(std::shared_ptr<const Sent> sent, httplib::Response& r) {
+    const size_t size = sent->head.size() + sent->pixels().size();
+    r.set_header("Cache-Control", "no-store");
+    r.set_content_provider(size, "application/octet-stream",
+                           [sent = std::move(sent)](size_t offset, size_t, httplib::DataSink& sink) {
+                               const std::string_view head = sent->head, pixels = sent->pixels();
+                               const std::string_view part =
+                                   offset < head.size() ? head.substr(offset) : pixels.substr(offset - head.size());
+                               return sink.write(part.data(), part.size());
+                           });
 }
 
 /// A page of somebody else that a browser shows must not drive this one, whatever its name resolves to.
@@ -60,23 +97,26 @@ void answer(ViewedRender& render, httplib::Server& server) {
             r.status = 204;
             return;
         }
-        r.set_header("Cache-Control", "no-store");
-        r.set_content(body_of(*picture), "application/octet-stream");
+        answer_with(sent_of(picture, q), r);
     });
-    server.Post("/camera", [&](const httplib::Request& q, httplib::Response&) {
+    const auto asked = [](uint64_t number, httplib::Response& r) {
+        r.set_content(text_of({{"asked", number}}), "application/json");
+    };
+    server.Post("/camera", [&render, asked](const httplib::Request& q, httplib::Response& r) {
         const auto json = nlohmann::json::parse(q.body);
-        if (json.value("reset", false)) return render.reset_camera();
-        render.look({vector_of(json.at("origin")), vector_of(json.at("target")), vector_of(json.at("up"))},
-                    json.value("moving", false));
+        if (json.value("reset", false)) return asked(render.reset_camera(), r);
+        const LookAt look = {vector_of(json.at("origin")), vector_of(json.at("target")), vector_of(json.at("up"))};
+        asked(render.look(look, json.value("moving", false)), r);
     });
-    server.Post("/method", [&](const httplib::Request& q, httplib::Response&) {
+    server.Post("/method", [&render, asked](const httplib::Request& q, httplib::Response& r) {
         std::vector<std::pair<std::string, std::string>> assignments;
         for (const auto& pair : nlohmann::json::parse(q.body))
             assignments.emplace_back(pair.at(0).get<std::string>(), pair.at(1).get<std::string>());
-        render.choose(assignments);
+        asked(render.choose(assignments), r);
     });
-    server.Post("/exposure", [&](const httplib::Request& q, httplib::Response&) {
-        render.expose(std::clamp(nlohmann::json::parse(q.body).at("stops").get<float>(), -100.0f, 100.0f));
+    server.Post("/exposure", [&render, asked](const httplib::Request& q, httplib::Response& r) {
+        const float stops = nlohmann::json::parse(q.body).at("stops").get<float>();
+        asked(render.expose(std::clamp(stops, -100.0f, 100.0f)), r);
     });
     server.set_exception_handler([](const httplib::Request&, httplib::Response& r, std::exception_ptr thrown) {
         try {
@@ -94,6 +134,9 @@ void serve(ViewedRender& render, const Address& address, const volatile bool* in
            const std::function<void(const std::string& url)>& started) {
     httplib::Server server;
     server.set_payload_max_length(kLargestRequest);
+    // Headers and body are written apart: without this the second waits for the other side to acknowledge the first.
+    server.set_tcp_nodelay(true);
+    server.set_keep_alive_max_count(kRequestsPerConnection);
     // The library's own options let a second program listen at the same port.
     server.set_socket_options([](socket_t s) {
         const int yes = 1;

@@ -1,15 +1,11 @@
 #include "view/viewed_render.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
 
+#include "backends/cuda/mean_on_device.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/seconds.h"
-#include "core/srgb.h"
 #include "film/metrics.h"
 #include "integrators/registry.h"
 #include "integrators/warnings.h"
@@ -18,44 +14,28 @@
 namespace ambilux {
 namespace {
 
-constexpr double kFrameSeconds = 1.0 / 30, kMovingSeconds = 1.0 / 20, kCompareSeconds = 0.5;
-constexpr uint32_t kLargestDivisor = 8;
-
-/// sRGB in 8 bits of the square of i / (size - 1): steps are even where the eye sees them.
-const std::array<uint8_t, 4096>& tone_table() {
-    static const auto table = [] {
-        std::array<uint8_t, 4096> t{};
-        for (size_t i = 0; i < t.size(); ++i) {
-            const float root = float(i) / float(t.size() - 1);
-            t[i] = uint8_t(linear_to_srgb(root * root) * 255.0f + 0.5f);
-        }
-        return t;
-    }();
-    return table;
-}
-
-std::vector<uint8_t> tone_mapped(const FilmMoments& film, float stops) {
-    const auto& table = tone_table();
-    const double scale = std::exp2(double(stops)) / double(std::max<uint64_t>(1, film.samples));
-    std::vector<uint8_t> rgba(size_t(film.width) * film.height * 4);
-    tbb::parallel_for(uint32_t(0), film.height, [&](uint32_t y) {
-        for (size_t p = size_t(y) * film.width, end = p + film.width; p < end; ++p) {
-            for (size_t c = 0; c < 3; ++c) {
-                const double value = film.sum[p * 3 + c] * scale;
-                // NaN fails the comparison and is black.
-                const double root = value > 0 ? std::sqrt(std::min(value, 1.0)) : 0;
-                rgba[p * 4 + c] = table[size_t(root * double(table.size() - 1) + 0.5)];
-            }
-            rgba[p * 4 + 3] = 255;
-        }
-    });
-    return rgba;
-}
+/// Between pictures that somebody waits for, between looks at what is asked for, and for a picture while the camera
+/// moves.
+constexpr double kFrameSeconds = 1.0 / 60, kSliceSeconds = 0.01, kMovingSeconds = 0.025, kCompareSeconds = 0.5;
 
 nlohmann::json vector_json(Vec3f v) { return {v.x, v.y, v.z}; }
 
 nlohmann::json look_json(const LookAt& look) {
     return {{"origin", vector_json(look.origin)}, {"target", vector_json(look.target)}, {"up", vector_json(look.up)}};
+}
+
+/// Waves of one sample, unless a pilot is to choose for more: a camera that moves asks for one.
+RenderSettings settings_of_a_view(RenderSettings s) {
+    if (!s.automatic && s.expected_samples == 0) s.expected_samples = 1;
+    return s;
+}
+
+nlohmann::json error_json(const std::optional<DeviceImage>& image, const FilmMoments& film,
+                          const Reference& reference) {
+    if (!image) return to_json(compare_images(film, reference));
+    Image copied = {image->width, image->height, {}};
+    copy_to_host(*image, copied.rgb);
+    return to_json(compare_images(copied, reference));
 }
 
 }  // namespace
@@ -74,6 +54,7 @@ ViewedRender::~ViewedRender() {
         const std::lock_guard lock(mutex_);
         ends_ = true;
         set_flag(&interrupt_);
+        set_flag(&give_up_);
     }
     wished_.notify_all();
     worker_.join();
@@ -93,41 +74,52 @@ nlohmann::json ViewedRender::description() const {
             {"reference", options_.reference.has_value()}};
 }
 
-void ViewedRender::ask(const std::function<void(Wish&)>& change, bool restart) {
+uint64_t ViewedRender::ask(Change kind, const std::function<void(Wish&)>& change) {
+    uint64_t number = 0;
     {
         const std::lock_guard lock(mutex_);
         change(wish_);
-        anew_ |= restart;
+        number = ++wish_.number;
+        anew_ |= kind != Change::repaint;
         repaint_ = true;
-        if (restart) set_flag(&interrupt_);
+        if (kind == Change::restart) set_flag(&interrupt_);
+        if (kind == Change::restart && !patient_) set_flag(&give_up_);
     }
     wished_.notify_all();
+    return number;
 }
 
-void ViewedRender::look(const LookAt& look, bool moving) {
+uint64_t ViewedRender::look(const LookAt& look, bool moving) {
     placed(sensor_, look);
-    ask([&](Wish& w) { w.look = look, w.moving = moving; }, true);
+    bool same = false;
+    {
+        const std::lock_guard lock(mutex_);
+        same = wish_.look == look;
+    }
+    return ask(same ? Change::settle : Change::restart, [&](Wish& w) { w.look = look, w.moving = moving; });
 }
 
-void ViewedRender::reset_camera() {
-    ask([](Wish& w) { w.look.reset(), w.moving = false; }, true);
+uint64_t ViewedRender::reset_camera() {
+    return ask(Change::restart, [](Wish& w) { w.look.reset(), w.moving = false; });
 }
 
-void ViewedRender::choose(const std::vector<std::pair<std::string, std::string>>& assignments) {
+uint64_t ViewedRender::choose(const std::vector<std::pair<std::string, std::string>>& assignments) {
     RenderSettings settings = first_;
     for (const auto& [key, value] : assignments) apply_setting(settings, key, value);
-    ask([&](Wish& w) { w.settings = settings, w.moving = false; }, true);
+    return ask(Change::restart, [&](Wish& w) { w.settings = settings, w.moving = false, ++w.method; });
 }
 
-void ViewedRender::expose(float stops) {
-    ask([&](Wish& w) { w.stops = stops; }, false);
+uint64_t ViewedRender::expose(float stops) {
+    return ask(Change::repaint, [&](Wish& w) { w.stops = stops; });
 }
 
 SharedPicture ViewedRender::wait(uint64_t after, std::chrono::milliseconds patience) {
     std::unique_lock lock(mutex_);
     const auto newer = [&] { return ends_ || (frame_ && frame_->number > after); };
-    if (!shown_now_.wait_for(lock, patience, newer) || ends_) return nullptr;
-    return frame_;
+    ++waiting_;
+    const bool come = shown_now_.wait_for(lock, patience, newer);
+    --waiting_;
+    return come && !ends_ ? frame_ : nullptr;
 }
 
 void ViewedRender::work() {
@@ -144,97 +136,161 @@ void ViewedRender::work() {
             wish = wish_;
             anew = std::exchange(anew_, false);
             repaint = std::exchange(repaint_, false);
+            patient_ = anew && wish.moving;
             interrupt_ = false;
+            give_up_ = false;
         }
         try {
-            if (anew) restart(wish);
+            if (anew && !shows(wish)) restart(wish);
+            shown_ = wish;
             if (renderer_ && samples_ < options_.most_samples) render_some();
         } catch (const std::exception& e) {  // of memory too
             problem_ = e.what();
-            renderer_.reset();
+            renderer_ = nullptr;
+            renderers_ = {};
         }
-        if (repaint || samples_ == 1 || seconds_since(published_) >= kFrameSeconds || !problem_.empty()) publish(wish);
+        if (!lost_ && (repaint || !problem_.empty() || is_due())) publish(wish);
     }
     shown_now_.notify_all();
 }
 
-uint32_t ViewedRender::divisor(const Wish& wish) const {
-    uint32_t d = 1;
-    while (wish.moving && d < kLargestDivisor && whole_seconds_ > kMovingSeconds * d * d) d *= 2;
-    return d;
+/// As large as there is time for a sample of every pixel.
+uint32_t ViewedRender::size_of(const Wish& wish) const {
+    uint32_t size = 0;
+    while (wish.moving && size + 1 < kSizes && first_seconds_ > kMovingSeconds * double(1u << (2 * size))) ++size;
+    return size;
+}
+
+bool ViewedRender::shows(const Wish& wish) const {
+    return renderer_ && !lost_ && wish.look == shown_.look && wish.method == shown_.method && size_of(wish) == size_;
 }
 
 void ViewedRender::restart(const Wish& wish) {
-    renderer_.reset();
+    const auto start = Clock::now();
+    if (wish.method != shown_.method) renderers_ = {};
+    size_ = size_of(wish);
+    renderer_ = nullptr;
     samples_ = 0;
-    error_ = nullptr;
-    scene_.sensor = smaller(wish.look ? placed(sensor_, *wish.look) : sensor_, divisor(wish));
-    try {
-        renderer_ = make_renderer(scene_, wish.settings, accels_);
-        shown_ = wish.settings;
-        problem_.clear();
-    } catch (const Error& e) {
-        problem_ = e.what();
+    lost_ = false;
+    error_ = warnings_ = nullptr;
+    compared_ = {};
+    scene_.sensor = smaller(wish.look ? placed(sensor_, *wish.look) : sensor_, 1u << size_);
+    problem_.clear();
+    if (!renderers_[size_] || !renderers_[size_]->move_camera()) make_renderer_of(wish, size_);
+    renderer_ = renderers_[size_].get();
+    if (renderer_) renderer_->give_up_when(&give_up_);
+    restart_seconds_ = seconds_since(start);
+}
+
+/// Beside those of other sizes, unless memory is short.
+void ViewedRender::make_renderer_of(const Wish& wish, uint32_t size) {
+    renderers_[size].reset();
+    if (wish.settings.memory > 0) renderers_ = {};
+    const RenderSettings settings = settings_of_a_view(wish.settings);
+    for (;;) {
+        try {
+            renderers_[size] = make_renderer(scene_, settings, accels_);
+            return;
+        } catch (const Error& e) {
+            const bool alone =
+                std::none_of(renderers_.begin(), renderers_.end(), [](const auto& r) { return bool(r); });
+            if (alone || e.code != ExitCode::device) {
+                problem_ = e.what();
+                return;
+            }
+            renderers_ = {};
+        }
     }
 }
 
 void ViewedRender::render_some() {
-    // Samples that lie ready cost nothing; else about as many as a frame has time for.
     const double pixels = double(scene_.sensor.crop_width) * scene_.sensor.crop_height /
                           (double(sensor_.crop_width) * sensor_.crop_height);
+    // Samples that lie ready cost nothing; else about as many as there is time for.
+    const uint32_t k = renderer_->iteration_samples(), ready = samples_ == 0 ? renderer_->ready() : 0;
     const double one = whole_seconds_ * pixels;
-    uint32_t count = samples_ && one > 0 ? uint32_t(std::clamp(kFrameSeconds / one, 1.0, 64.0)) : 1;
-    if (samples_ == 0) count = std::max(count, renderer_->ready());
-    const uint32_t k = renderer_->iteration_samples();
+    uint32_t count = samples_ && one > 0 ? uint32_t(std::clamp(kSliceSeconds / one, 1.0, 64.0)) : std::max(1u, ready);
     count = std::max(k, count / k * k);
     const auto start = Clock::now();
-    const uint32_t done = renderer_->render(samples_, count, &interrupt_);
-    if (done && done > renderer_->ready()) whole_seconds_ = seconds_since(start) / done / pixels;
+    const bool first = samples_ == 0;
+    const uint32_t done = renderer_->render(samples_, count, patient_ ? nullptr : &interrupt_);
+    const double seconds = seconds_since(start);
+    lost_ = is_set(&give_up_);
+    // Of one that was given up it is known that it takes longer.
+    if (lost_) whole_seconds_ = first_seconds_ = std::max(first_seconds_, seconds / count / pixels);
+    if (lost_ || done == 0) return;
+    if (done > ready) whole_seconds_ = seconds / (done - ready) / pixels;
+    if (first) first_seconds_ = whole_seconds_;
+    if (first) render_seconds_ = seconds;
     samples_ += done;
 }
 
-nlohmann::json ViewedRender::facts(const FilmMoments& film, const Wish& wish) {
-    nlohmann::json out = {{"samples", film.samples}, {"problem", problem_}, {"fps", frames_per_second_}};
+bool ViewedRender::is_due() {
+    if (samples_ >= options_.most_samples) return true;
+    const std::lock_guard lock(mutex_);
+    return waiting_ > 0 && seconds_since(published_) >= kFrameSeconds;
+}
+
+/// What comes of it is shown once it is there: the render does not wait, but for the last picture.
+void ViewedRender::compare(const Wish& wish) {
+    const std::optional<Reference>& reference = options_.reference;
+    const bool comparable = reference && !wish.look && samples_ && size_ == 0, last = samples_ >= options_.most_samples;
+    if (comparison_.valid() && (last || comparison_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)) {
+        nlohmann::json found = comparison_.get();
+        if (comparable && compared_ != Clock::time_point()) error_ = std::move(found);
+    }
+    if (!comparable || comparison_.valid() || (!last && seconds_since(compared_) < kCompareSeconds)) return;
+    compared_ = Clock::now();
+    const std::optional<DeviceImage> image = renderer_->device_image();
+    comparison_ = std::async(std::launch::async, [image, film = image ? FilmMoments() : renderer_->film(), &reference] {
+        return error_json(image, film, *reference);
+    });
+    if (last) error_ = comparison_.get();
+}
+
+nlohmann::json ViewedRender::facts(const Wish& wish) {
+    nlohmann::json out = {
+        {"asked", wish.number}, {"samples", samples_}, {"problem", problem_}, {"fps", frames_per_second_}};
     if (!renderer_) return out;
     const RenderStats stats = renderer_->stats();
     out["seconds"] = stats.render_seconds;
     out["device"] = stats.device;
-    out["method"] = stats.selection.name.empty() ? shown_.integrator + " " + shown_.variant : stats.selection.name;
+    const std::string name = wish.settings.integrator + " " + wish.settings.variant;
+    out["method"] = stats.selection.name.empty() ? name : stats.selection.name;
     const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
     out["rays_per_second"] = stats.render_seconds > 0 ? rays / stats.render_seconds : 0;
     out["invalid"] = stats.invalid.total();
-    out["warnings"] = render_warnings(scene_, used_settings(shown_, stats));
+    if (warnings_.is_null()) warnings_ = render_warnings(scene_, used_settings(wish.settings, stats));
+    out["warnings"] = warnings_;
+    out["picture_seconds"] = {
+        {"restart", restart_seconds_}, {"first_sample", render_seconds_}, {"picture", picture_seconds_}};
     nlohmann::json& stages = out["stages"] = nlohmann::json::array();
     for (const StageStats& s : stats.stages)
         if (s.items) stages.push_back({{"name", s.name}, {"seconds", s.seconds}, {"items", s.items}});
-    const std::optional<Reference>& reference = options_.reference;
-    if (reference && !wish.look && film.samples && film.width == reference->mean.width &&
-        film.height == reference->mean.height) {
-        if (error_.is_null() || seconds_since(compared_) > kCompareSeconds) {
-            error_ = to_json(compare_images(film, *reference));
-            compared_ = Clock::now();
-        }
-        out["error"] = error_;
-    }
+    compare(wish);
+    if (!error_.is_null()) out["error"] = error_;
     return out;
 }
 
 void ViewedRender::publish(const Wish& wish) {
+    const auto start = Clock::now();
     auto frame = std::make_shared<Picture>();
-    if (renderer_) {
-        const FilmMoments film = renderer_->film();
-        frame->width = film.width;
-        frame->height = film.height;
-        frame->rgba = tone_mapped(film, wish.stops);
-        frame->facts = facts(film, wish);
-    } else {
-        frame->facts = facts({}, wish);
+    try {
+        if (renderer_) frame->image = renderer_->picture(wish.stops);
+        picture_seconds_ = seconds_since(start);
+        frame->facts = facts(wish);
+    } catch (const std::exception& e) {
+        problem_ = e.what();
+        renderer_ = nullptr;
+        renderers_ = {};
+        *frame = {0, {}, facts(wish)};
     }
     const double since = seconds_since(published_);
     if (published_ != Clock::time_point()) frames_per_second_ += 0.1 * (1 / since - frames_per_second_);
     published_ = Clock::now();
     {
         const std::lock_guard lock(mutex_);
+        patient_ = false;
         frame->number = frame_ ? frame_->number + 1 : 1;
         frame_ = std::move(frame);
     }

@@ -70,8 +70,8 @@ std::shared_ptr<const DeviceScene> SharedAccels::get() {
         // With the structure, if it is made: it comes next.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
-        const uint64_t accel_bytes =
-            (cwbvh_ ? cwbvh_->memory_bytes() : 0) + (light_tree_ ? light_tree_->memory_bytes() : 0);
+        const uint64_t accel_bytes = (structures_->cwbvh ? structures_->cwbvh->memory_bytes() : 0) +
+                                     (light_tree_ ? light_tree_->memory_bytes() : 0);
         check_scene_fits(scene_, textures_, accel_bytes, free, total, cuda_device_name());
         const bool on_host = textures_ != TextureMemory::device;
         return std::make_shared<const DeviceScene>(scene_, on_host ? get<HostTexels>() : nullptr);

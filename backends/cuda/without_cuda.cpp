@@ -15,7 +15,9 @@ Error not_built() { return {ExitCode::device, "this program was built without CU
 
 bool cuda_device_present() { return false; }
 
-const char* why_no_cuda_device() {
+double cuda_start_seconds() { return 0; }
+
+std::string why_no_cuda_device() {
     return "this program was built without CUDA: install the CUDA toolkit and build again, or take backend cpu";
 }
 
@@ -26,6 +28,16 @@ std::string cuda_device_bus_id() { return {}; }
 int cuda_device_count() { return 0; }
 
 void use_cuda_device(int) { throw not_built(); }
+
+KernelChoice cuda_kernels() { return {}; }
+
+bool cuda_graphs_choose() { return false; }
+
+CudaReport cuda_report() {
+    CudaReport report;
+    report.problem = why_no_cuda_device();
+    return report;
+}
 
 void copy_to_host(const DeviceImage&, std::vector<float>&) { throw not_built(); }
 

@@ -162,7 +162,7 @@ std::unique_ptr<Renderer> PeerRuns::make(const RenderOf& render, const RenderSta
 MethodNames PeerRuns::names(const RenderOf& render, const RenderStats&) const {
     const nlohmann::json* entry = find(render.scene, render.run);
     MethodNames names{setting_value(render.run.settings, "integrator"), setting_value(render.run.settings, "variant"),
-                      "", entry ? entry->value("version", "") : render.run.renderer};
+                      "", entry ? entry->value("version", "") : render.run.renderer, ""};
     if (names.integrator.empty())
         names.integrator = render.run.renderer;
     else

@@ -103,19 +103,16 @@ void read_plastic(Builder& builder, Reader& in, Parameters& p) {
 void precompute_rough_plastic(Builder& builder, Textured<RoughPlastic>& p) {
     const std::string key = "transmittance " + std::to_string(int(p.distribution)) + " " +
                             std::to_string(float_bits(p.alpha.value)) + " " + std::to_string(float_bits(p.ior));
-    const auto it = builder.table_pool.find(key);
-    if (it != builder.table_pool.end()) {
-        p.transmittance_table = it->second;
-        p.fdr_internal = builder.rough_reflectance_pool[key];
-        return;
+    p.transmittance_table = builder.add_table(key, kTransmittanceTableSize, [&](float* table) {
+        rough_transmittance_table(p.distribution, p.alpha.value, p.ior, table);
+    });
+    const auto [known, added] = builder.rough_reflectance_pool.try_emplace(key, 0.0f);
+    if (added) {
+        const auto* before = builder.before ? &builder.before->reflectance_pool : nullptr;
+        const bool same = before && before->contains(key);
+        known->second = same ? before->at(key) : rough_internal_reflectance(p.distribution, p.alpha.value, p.ior);
     }
-    p.transmittance_table = uint32_t(builder.scene.tables.size());
-    builder.scene.tables.resize(builder.scene.tables.size() + kTransmittanceTableSize);
-    rough_transmittance_table(p.distribution, p.alpha.value, p.ior,
-                              builder.scene.tables.data() + p.transmittance_table);
-    p.fdr_internal = rough_internal_reflectance(p.distribution, p.alpha.value, p.ior);
-    builder.table_pool[key] = p.transmittance_table;
-    builder.rough_reflectance_pool[key] = p.fdr_internal;
+    p.fdr_internal = known->second;
 }
 
 // One plugin a model: what its XML says, as parameters.

@@ -10,17 +10,12 @@
 #include "core/error.h"
 #include "core/sha256.h"
 #include "formats/document/document.h"
+#include "formats/document/kept.h"
 #include "formats/document/plugins.h"
 #include "formats/document/spectrum.h"
 #include "formats/load.h"
 
 namespace ambilux::document {
-
-/// Of the colours of a texture.
-struct TextureFacts {
-    Rgb mean{}, largest{};
-    std::string file;  ///< that they come from
-};
 
 struct Builder {
     Builder(const Document& d, const LoadOptions& o, Vec3d p, Scene& s)
@@ -35,7 +30,7 @@ struct Builder {
     std::vector<std::pair<std::string, Sha256Digest>> file_digests;  ///< of meshes and images
     std::map<std::string, uint64_t> texel_pool;                      ///< file and decoding -> offset
     std::map<std::string, int32_t> texture_pool;                     ///< all settings -> texture
-    std::map<std::string, struct LoadedImage> images;                ///< by path and decoding
+    std::map<std::string, LoadedImage> images;                       ///< by path and decoding
     std::vector<TextureFacts> texture_facts;                         ///< per texture
     std::map<const Object*, uint32_t> materials;
     uint32_t default_materials[2] = {kNone, kNone};  ///< of shapes without and with an emitter
@@ -48,6 +43,13 @@ struct Builder {
     const std::map<std::string, int32_t>* attribute_textures = nullptr;
 
     uint64_t memory = 0;  ///< of meshes and textures
+
+    const Kept* before = nullptr;  ///< of the scene that this one is an edit of; null: none
+    KeptGeometry geometry;
+    std::map<const Object*, std::vector<Value>>* asked = nullptr;  ///< gets Kept::asked; null: nobody wants it
+
+    /// Appends the table of that name, which may be that of the scene before; its place in Scene::tables.
+    uint32_t add_table(const std::string& name, size_t size, const std::function<void(float*)>& make);
 
     /// Counts memory that the scene is going to have; Error(bad_input) with `path` if it is too much in all.
     void take_memory(uint64_t bytes, const std::string& path);
@@ -77,15 +79,6 @@ struct Builder {
 /// Append to the scene; the index there.
 uint32_t add_bsdf(Builder& builder, const BsdfRecord& bsdf);
 uint32_t add_material(Builder& builder, const Material& material);
-
-/// Size and place of an image whose texels are in the scene.
-struct LoadedImage {
-    uint32_t width = 0, height = 0;
-    uint64_t offset = 0;
-    TexelFormat format = TexelFormat::rgba8;
-    uint32_t decode_table = 0;
-    TextureFacts facts;
-};
 
 /// Appends bytes at the next multiple of 16.
 uint64_t append_texels(Scene& scene, const void* data, size_t size);
@@ -147,6 +140,8 @@ public:
     void finish();
 
 private:
+    /// Keeps what holds where the object says nothing of a parameter (Kept::asked).
+    void keep(const std::string& name, ValueKind kind, const std::function<void(Value&)>& set) const;
     std::string unknown(const Value& value, const Plugins& known) const;
     ParamRgb checked_reflectance(const std::string& name, const Object& texture, const ParamRgb& parameter);
     const Value* value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected);

@@ -40,14 +40,16 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
     if (builder.validate_only) return place;
     // Of the light that enters, what the layer lets pass twice stands against all that is reflected (Mitsuba 0.6).
     const float passes = (std::exp(-2 * absorption.x) + std::exp(-2 * absorption.y) + std::exp(-2 * absorption.z)) / 3;
-    std::vector<float>& tables = builder.scene.tables;
-    place.table = uint32_t(tables.size());
+    std::vector<float> table;
     for (float f : {ior, alpha, distribution == Microfacets::ggx ? 1.0f : 0.0f, 1 / (1 + passes), specular.x,
                     specular.y, specular.z, absorption.x, absorption.y, absorption.z, 0.0f, 0.0f})
-        tables.push_back(f);
-    if (!place.rough) return place;
-    tables.resize(tables.size() + kTransmittanceTableSize);
-    rough_transmittance_table(distribution, alpha, ior, tables.data() + place.table + Coat::kFloats);
+        table.push_back(f);
+    if (place.rough) {
+        table.resize(table.size() + kTransmittanceTableSize);
+        rough_transmittance_table(distribution, alpha, ior, table.data() + Coat::kFloats);
+    }
+    place.table = uint32_t(builder.scene.tables.size());
+    builder.scene.tables.append(table.data(), table.size());
     return place;
 }
 

@@ -28,6 +28,28 @@ const Value* Object::find(const std::string& name) const {
     return nullptr;
 }
 
+namespace {
+
+template <class T>
+const T* found(const std::map<std::string, std::shared_ptr<const T>>& given, const std::map<std::string, T>& own,
+               const std::map<std::string, T>* first, const std::string& name) {
+    if (const auto at = given.find(name); at != given.end()) return at->second.get();
+    if (const auto at = own.find(name); at != own.end()) return &at->second;
+    if (!first) return nullptr;
+    const auto at = first->find(name);
+    return at == first->end() ? nullptr : &at->second;
+}
+
+}  // namespace
+
+const Mesh* Document::mesh(const std::string& name) const {
+    return found(given_meshes, meshes, first ? &first->meshes : nullptr, name);
+}
+
+const Texels* Document::image(const std::string& name) const {
+    return found(given_images, images, first ? &first->images : nullptr, name);
+}
+
 std::string Document::resolve(const std::string& name, const Where& where) const {
     std::error_code ignored;
     std::vector<fs::path> folders(search_folders.rbegin(), search_folders.rend());
@@ -83,8 +105,8 @@ void for_all_below(const Object& object, const std::function<void(const Object&)
     visit(object);
 }
 
-void note_image(std::vector<std::string>& notes, const std::string& path, const Texels& image) {
-    for (const std::string& text : image.notes)
+void note_image(std::vector<std::string>& notes, const std::string& path, const std::vector<std::string>& of_image) {
+    for (const std::string& text : of_image)
         if (const std::string note = path + ": " + text; std::find(notes.begin(), notes.end(), note) == notes.end())
             notes.push_back(note);
 }
@@ -93,7 +115,7 @@ Texels read_image_file(Document& document, const std::string& path) {
     const std::string bytes = read_input(path, document.limits);
     document.file_digests.push_back({path, sha256(bytes)});
     Texels texels = read_image(path, bytes, document.limits);
-    note_image(document.notes, path, texels);
+    note_image(document.notes, path, texels.notes);
     return texels;
 }
 

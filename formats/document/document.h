@@ -77,9 +77,10 @@ struct Document {
     std::vector<std::unique_ptr<Object>> storage;
     Object* scene = nullptr;
     std::map<std::string, const Object*> ids;
-    std::vector<std::string> search_folders;                 ///< of <path>, in order
-    std::vector<std::pair<std::string, std::string>> files;  ///< path and text of the scene files read
-    std::map<std::string, Where> included_from;              ///< of those that others include: by which
+    std::vector<std::string> search_folders;  ///< of <path>, in order
+    /// Path and text of the scene files read.
+    std::vector<std::pair<std::string, std::shared_ptr<const std::string>>> files;
+    std::map<std::string, Where> included_from;  ///< of those that others include: by which
     Limits limits;
 
     // What front ends of other formats hand over (formats/pbrt, formats/gltf).
@@ -93,6 +94,17 @@ struct Document {
     bool mirrors_turn_in = true;          ///< mirrored meshes of files, and spheres, turn in, as in Mitsuba 2 and 3
 
     bool clips_reflectances = false;  ///< textures that reflect more than 1 reflect 1, as in pbrt and glTF
+
+    // What edits add (formats/edits.h).
+    std::shared_ptr<const Document> first;  ///< that this one began as: it has `meshes` and `images`; null: none
+    std::map<std::string, std::shared_ptr<const Mesh>> given_meshes;
+    std::map<std::string, std::shared_ptr<const Texels>> given_images;
+    std::map<std::string, std::string> edits;  ///< by the names of what was changed, as text
+
+    /// By its name, or null.
+    const Mesh* mesh(const std::string& name) const;
+    bool has_meshes() const { return !meshes.empty() || !given_meshes.empty() || first; }
+    const Texels* image(const std::string& name) const;
 
     /// Path of a file named in `where.file`: in the <path> folders, the last one first, then in the folder of the main
     /// file, as in Mitsuba, and then in that of the file that names it. Throws Error(bad_input) if there is none.
@@ -127,7 +139,7 @@ Texels& add_image(Document& document, const std::string& name, uint32_t width, u
 /// A texture of an image of the document, its values as they are, and not repeated.
 Object& add_bitmap(Document& document, const Where& where, const std::string& image, const char* filter = "bilinear");
 /// What the file of an image says of itself and is not taken as it says, each once.
-void note_image(std::vector<std::string>& notes, const std::string& path, const Texels& image);
+void note_image(std::vector<std::string>& notes, const std::string& path, const std::vector<std::string>& of_image);
 /// Texels of a file, its digest and what there is to say of it.
 Texels read_image_file(Document& document, const std::string& path);
 /// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.
@@ -141,7 +153,11 @@ void set_rgb(Object& object, const std::string& name, Rgb value);
 void set_vector(Object& object, const std::string& name, Vec3d value);
 void set_transform(Object& object, const std::string& name, const Matrix& value);
 
-/// The finished scene. `path` is for messages.
-Scene load_document(const std::string& path, const Document& document, const LoadOptions& options);
+struct Kept;
+
+/// The finished scene. `path` is for messages. With LoadOptions::editable, what is the same in its `kept` is taken
+/// over, and that of this scene is left there.
+Scene load_document(const std::string& path, const std::shared_ptr<const Document>& document,
+                    const LoadOptions& options);
 
 }  // namespace ambilux::document

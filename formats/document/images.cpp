@@ -14,13 +14,9 @@ namespace ambilux::document {
 namespace {
 
 uint32_t decode_table(Builder& builder, double gamma) {
-    const std::string key = "decode " + std::to_string(gamma);
-    const auto it = builder.table_pool.find(key);
-    if (it != builder.table_pool.end()) return it->second;
-    const uint32_t offset = uint32_t(builder.scene.tables.size());
-    for (int i = 0; i < 256; ++i) builder.scene.tables.push_back(float(decoded(float(i) / 255.0f, gamma)));
-    builder.table_pool[key] = offset;
-    return offset;
+    return builder.add_table("decode " + std::to_string(gamma), 256, [&](float* table) {
+        for (int i = 0; i < 256; ++i) table[i] = float(decoded(float(i) / 255.0f, gamma));
+    });
 }
 
 /// True if all colours keep a precision of 2^-11 as halves: none is too large, and none that is not zero too small.
@@ -46,9 +42,10 @@ void spread_channel(Texels& image, size_t channel) {
 }  // namespace
 
 uint64_t append_texels(Scene& scene, const void* data, size_t size) {
-    const uint64_t offset = (scene.texels.size() + 15) / 16 * 16;
-    scene.texels.resize(offset + size);
-    memcpy(scene.texels.data() + offset, data, size);
+    constexpr uint8_t kPadding[16] = {};
+    const uint64_t end = scene.texels.size(), offset = (end + 15) / 16 * 16;
+    scene.texels.append(kPadding, offset - end);
+    scene.texels.append(static_cast<const uint8_t*>(data), size);
     return offset;
 }
 
@@ -63,42 +60,24 @@ uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allo
     return append_texels(scene, halves.data(), halves.size() * sizeof halves[0]);
 }
 
-LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel,
-                       const Texels* given) {
-    const std::string key = (given ? "given|" : "") + path + "|" + std::to_string(gamma) + (as_float ? "|float" : "") +
-                            std::to_string(channel);
-    const auto known = builder.images.find(key);
-    if (known != builder.images.end()) return known->second;
+namespace {
 
-    const ScopedSeconds clock(&builder.options.times->read);
-    Texels own;
-    if (!given) {
-        const std::string bytes = read_input(path, builder.options.limits);
-        builder.file_digests.push_back({path, sha256(bytes)});
-        own = read_image(path, bytes, builder.options.limits);
-        note_image(builder.scene.notes, path, own);
-    } else if (channel >= 0) {
-        own = *given;
-    }
-    const Texels& image = given && channel < 0 ? *given : own;
-    if (channel >= 0) spread_channel(own, size_t(channel));
-    if (channel == 3) gamma = 1;
-    const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
-    LoadedImage out;
-    out.width = image.width;
-    out.height = image.height;
-    out.facts.file = path;
+/// Puts the texels of an image into the scene, unless those that stand for `pool` are there.
+void place_bytes(Builder& builder, const std::string& pool, const uint8_t* bytes, LoadedImage& out) {
+    out.decode_table = decode_table(builder, out.gamma);
+    const auto [it, added] = builder.texel_pool.try_emplace(pool, 0);
+    if (added) it->second = append_texels(builder.scene, bytes, out.bytes());
+    out.offset = it->second;
+}
+
+void place_image(Builder& builder, const std::string& path, const std::string& pool, const Texels& image, bool as_float,
+                 LoadedImage& out) {
     Rgb& largest = out.facts.largest;
     double mean[3] = {0, 0, 0};
     const size_t count = size_t(image.width) * image.height;
-    builder.take_memory(count * (image.is_8bit && !as_float ? 4 : 16), path);
     if (image.is_8bit && !as_float) {
         out.format = TexelFormat::rgba8;
-        out.decode_table = decode_table(builder, used_gamma);
-        const auto [it, added] =
-            builder.texel_pool.try_emplace((given ? "given|" : "") + path + "|" + std::to_string(channel), 0);
-        if (added) it->second = append_texels(builder.scene, image.bytes.data(), image.bytes.size());
-        out.offset = it->second;
+        place_bytes(builder, pool, image.bytes.data(), out);
         const float* table = builder.scene.tables.data() + out.decode_table;
         for (size_t i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) {
@@ -109,7 +88,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         std::vector<float> texels(count * 4);
         for (size_t i = 0; i < texels.size(); ++i) {
             const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
-            texels[i] = i % 4 == 3 ? stored : float(decoded(stored, used_gamma));
+            texels[i] = i % 4 == 3 ? stored : float(decoded(stored, out.gamma));
             if (!std::isfinite(texels[i]))
                 throw input_error(path, 0,
                                   "texel (" + std::to_string(i / 4 % image.width) + ", " +
@@ -119,6 +98,64 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         out.offset = append_floats(builder.scene, texels, as_float, out.format);
     }
     out.facts.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
+}
+
+/// Places the image as the scene before has it.
+void place_again(Builder& builder, const std::string& pool, LoadedImage& image) {
+    const uint8_t* bytes = builder.before->scene.texels.data() + image.offset;
+    if (image.format == TexelFormat::rgba8)
+        place_bytes(builder, pool, bytes, image);
+    else
+        image.offset = append_texels(builder.scene, bytes, image.bytes());
+}
+
+LoadedImage read_and_place(Builder& builder, const std::string& path, const std::string& pool, double gamma,
+                           bool as_float, int channel, const Texels* given) {
+    LoadedImage out;
+    Texels own;
+    if (!given) {
+        const std::string bytes = read_input(path, builder.options.limits);
+        out.digest = sha256(bytes);
+        own = read_image(path, bytes, builder.options.limits);
+        out.notes = own.notes;
+    } else if (channel >= 0) {
+        own = *given;
+    }
+    const Texels& image = given && channel < 0 ? *given : own;
+    if (channel >= 0) spread_channel(own, size_t(channel));
+    if (channel == 3) gamma = 1;
+    out.gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
+    out.width = image.width;
+    out.height = image.height;
+    out.facts.file = path;
+    out.memory = uint64_t(image.width) * image.height * (image.is_8bit && !as_float ? 4 : 16);
+    builder.take_memory(out.memory, path);
+    place_image(builder, path, pool, image, as_float, out);
+    return out;
+}
+
+}  // namespace
+
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel,
+                       const Texels* given) {
+    const std::string name = (given ? "given|" : "") + path + "|";
+    const std::string key = name + std::to_string(gamma) + (as_float ? "|float" : "") + std::to_string(channel);
+    const auto known = builder.images.find(key);
+    if (known != builder.images.end()) return known->second;
+
+    const ScopedSeconds clock(&builder.options.times->read);
+    const std::string pool = name + std::to_string(channel);
+    LoadedImage out;
+    const auto* before = builder.before ? &builder.before->images : nullptr;
+    if (before && before->contains(key)) {
+        out = before->at(key);
+        builder.take_memory(out.memory, path);
+        place_again(builder, pool, out);
+    } else {
+        out = read_and_place(builder, path, pool, gamma, as_float, channel, given);
+    }
+    if (!given) builder.file_digests.push_back({path, out.digest});
+    note_image(builder.scene.notes, path, out.notes);
     builder.images[key] = out;
     return out;
 }

@@ -19,12 +19,16 @@ std::array<uint8_t, 32> content_hash(const Builder& builder) {
         hash.update(std::to_string(text.size()) + ":");
         hash.update(text);
     };
-    for (const auto& [path, text] : builder.document.files) add(text);
+    for (const auto& [path, text] : builder.document.files) add(*text);
     for (const auto& [path, digest] : builder.file_digests) hash.update(digest.data(), digest.size());
     const LoadOptions& o = builder.options;
     add(std::to_string(o.width) + " " + std::to_string(o.height) + " " + std::to_string(o.lenient) + " " +
         std::to_string(o.light_picking == LightPicking::uniform));
     for (const auto& [name, value] : o.parameters) {
+        add(name);
+        add(value);
+    }
+    for (const auto& [name, value] : builder.document.edits) {
         add(name);
         add(value);
     }
@@ -68,14 +72,18 @@ void build_default_light(Builder& builder, const Document& document) {
     build_emitter(builder, emitter);
 }
 
-/// All but what finalize_scene() adds, in coordinates about `origin`. `outside`: Builder::outside.
+/// All but what finalize_scene() adds, in coordinates about `origin`. `outside`: Builder::outside. `kept`, if it is not
+/// null, has what was kept of the scene before, if there was one, and gets what is kept of this one but the scene.
 Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin,
-                  std::optional<Error>* outside) {
+                  std::optional<Error>* outside, const Kept* before, Kept* kept) {
     Scene scene;
     scene.path = path;
     scene.origin = {origin.x, origin.y, origin.z};
     Builder builder(document, options, origin, scene);
     builder.outside = outside;
+    builder.before = before;
+    if (before) scene.texels = before->scene.texels.emptied(), scene.tables = before->scene.tables.emptied();
+    if (kept) builder.asked = &kept->asked;
     scene.warnings = document.warnings;
     scene.notes = document.notes;
     builder.file_digests = document.file_digests;
@@ -110,35 +118,55 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
         for (const auto& [file, text] : document.files) options.files->push_back(file);
         for (const auto& [file, digest] : builder.file_digests) options.files->push_back(file);
     }
+    if (kept) {
+        kept->images = std::move(builder.images);
+        kept->table_pool = std::move(builder.table_pool);
+        kept->reflectance_pool = std::move(builder.rough_reflectance_pool);
+        kept->geometry = std::move(builder.geometry);
+    }
     return scene;
 }
 
-Scene place_scene(const std::string& path, const Document& document, const LoadOptions& options) {
+Scene place_scene(const std::string& path, const Document& document, const LoadOptions& options, const Kept* before,
+                  Kept* kept) {
     std::optional<Error> outside;
-    Scene scene = build_scene(path, document, options, {}, &outside);
+    Scene scene = build_scene(path, document, options, {}, &outside, before, kept);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
-    if (const Vec3d c = far_center(scene); c.x != 0 || c.y != 0 || c.z != 0)
-        scene = build_scene(path, document, options, c, nullptr);
-    else if (outside)
+    const Bounds3f surfaces =
+        before && same_geometry(scene, before->scene) ? before->geometry.surfaces : surface_bounds(scene);
+    if (kept) kept->geometry.surfaces = surfaces;
+    if (const Vec3d c = far_center(scene, surfaces); c.x != 0 || c.y != 0 || c.z != 0) {
+        if (kept) kept->asked.clear();
+        scene = build_scene(path, document, options, c, nullptr, before, kept);
+        if (kept) kept->geometry.surfaces = surface_bounds(scene);
+    } else if (outside) {
         throw Error(*outside);
+    }
     return scene;
 }
 
 }  // namespace
 
-Scene document::load_document(const std::string& path, const Document& document, const LoadOptions& options) {
+Scene document::load_document(const std::string& path, const std::shared_ptr<const Document>& document,
+                              const LoadOptions& options) {
     LoadTimes times;
     LoadOptions timed_options = options;
     timed_options.times = &times;
+    const std::shared_ptr<const Kept> before = options.editable ? options.editable->kept : nullptr;
+    const std::shared_ptr<Kept> kept = options.editable ? std::make_shared<Kept>() : nullptr;
     const auto placed = [&] {
         const ScopedSeconds clock(&times.place);
-        return place_scene(path, document, timed_options);
+        return place_scene(path, *document, timed_options, before.get(), kept.get());
     };
     Scene scene = placed();
     times.place -= times.read;
     {
         const ScopedSeconds clock(&times.finish);
-        finalize_scene(scene, options.light_picking);
+        finalize_scene(scene, options.light_picking, before ? &before->scene : nullptr);
+    }
+    if (kept) {
+        kept->scene = scene;
+        *options.editable = {document, kept};
     }
     if (options.times) {
         options.times->read += times.read;

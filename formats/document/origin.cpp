@@ -20,8 +20,8 @@ Bounds3f surface_bounds(const Scene& scene) {
     return box;
 }
 
-Vec3d far_center(const Scene& scene) {
-    Bounds3f box = surface_bounds(scene);
+Vec3d far_center(const Scene& scene, const Bounds3f& surfaces) {
+    Bounds3f box = surfaces;
     const auto& m = scene.sensor.to_world.m;
     box.extend(Vec3f{m[0][3], m[1][3], m[2][3]});
     const Vec3d c = (in_double(box.lower) + in_double(box.upper)) * 0.5;

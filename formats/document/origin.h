@@ -11,7 +11,7 @@ namespace ambilux::document {
 Bounds3f surface_bounds(const Scene& scene);
 
 /// The centre of a scene, in its own coordinates, if all shapes and the camera lie so far from (0,0,0), for their size,
-/// that floats have lost digits there which they have near it; else (0,0,0). `scene`: before finalize_scene().
-Vec3d far_center(const Scene& scene);
+/// that floats have lost digits there which they have near it; else (0,0,0). `surfaces`: surface_bounds().
+Vec3d far_center(const Scene& scene, const Bounds3f& surfaces);
 
 }  // namespace ambilux::document

@@ -5,9 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "core/nearest.h"
+
 namespace ambilux::document {
 
-using Plugins = std::vector<std::string>;
+using Plugins = Names;
 
 const Plugins& bsdf_plugins();
 const Plugins& emitter_plugins();
@@ -27,17 +29,6 @@ Plugins with_plugins_of(Plugins list = {}) {
 }
 
 bool is_one_of(const Plugins& plugins, const std::string& type);
-
-/// The one of these that differs from `name` by a letter or two; empty if there is none.
-std::string nearest_name(const Plugins& known, const std::string& name);
-/// The end of a message about `name`: which of these it nearly is; empty if none.
-std::string nearly(const Plugins& known, const std::string& name);
-template <class T>
-std::string nearly(const std::map<std::string, T>& known, const std::string& name) {
-    Plugins names;
-    for (const auto& entry : known) names.push_back(entry.first);
-    return nearly(names, name);
-}
 
 /// Why `type` may have been written for an object with this tag, as the end of a message: it is another kind of object,
 /// or nearly one of these; empty if neither.

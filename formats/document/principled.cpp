@@ -79,9 +79,10 @@ void set_slots(Builder& builder, Textured<Model>& p, SlotsOf<Model> slots) {
         constants = Model::with_slots(constants, numbers);
     } else if (!builder.validate_only) {
         set_slots_at(constants, uint32_t(builder.scene.tables.size()));
-        for (const ParamFloat& slot : all)
-            for (const float word : {slot.value, std::bit_cast<float>(slot.texture)})
-                builder.scene.tables.push_back(word);
+        for (const ParamFloat& slot : all) {
+            const float words[] = {slot.value, std::bit_cast<float>(slot.texture)};
+            builder.scene.tables.append(words, 2);
+        }
     }
 }
 

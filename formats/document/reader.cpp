@@ -52,6 +52,20 @@ void Builder::take_memory(uint64_t bytes, const std::string& path) {
                               std::to_string(options.limits.total_bytes));
 }
 
+uint32_t Builder::add_table(const std::string& name, size_t size, const std::function<void(float*)>& make) {
+    const auto [it, added] = table_pool.try_emplace(name, uint32_t(scene.tables.size()));
+    if (!added) return it->second;
+    if (before)
+        if (const auto same = before->table_pool.find(name); same != before->table_pool.end()) {
+            scene.tables.append(before->scene.tables.data() + same->second, size);
+            return it->second;
+        }
+    std::vector<float> table(size);
+    make(table.data());
+    scene.tables.append(table.data(), size);
+    return it->second;
+}
+
 void Builder::fail_unless_moved(const Error& error) const {
     if (!outside) throw error;
     static std::mutex mutex;
@@ -101,32 +115,48 @@ const Value* Reader::value(const std::string& name, std::initializer_list<ValueK
     return v;
 }
 
+void Reader::keep(const std::string& name, ValueKind kind, const std::function<void(Value&)>& set) const {
+    if (!builder_.asked) return;
+    std::vector<Value>& known = (*builder_.asked)[&object_];
+    if (std::any_of(known.begin(), known.end(), [&](const Value& v) { return v.name == name; })) return;
+    Value& value = known.emplace_back();
+    value.name = name;
+    value.kind = kind;
+    set(value);
+}
+
 bool Reader::boolean(const std::string& name, bool fallback) {
+    keep(name, ValueKind::boolean, [&](Value& v) { v.number = fallback; });
     const Value* v = value(name, {ValueKind::boolean}, "a boolean");
     return v ? v->number != 0 : fallback;
 }
 
 int64_t Reader::integer(const std::string& name, int64_t fallback) {
+    keep(name, ValueKind::integer, [&](Value& v) { v.number = double(fallback); });
     const Value* v = value(name, {ValueKind::integer}, "an integer");
     return v ? int64_t(v->number) : fallback;
 }
 
 double Reader::number(const std::string& name, double fallback) {
+    keep(name, ValueKind::number, [&](Value& v) { v.number = fallback; });
     const Value* v = value(name, {ValueKind::number, ValueKind::integer}, "a number");
     return v ? v->number : fallback;
 }
 
 std::string Reader::text(const std::string& name, const std::string& fallback) {
+    keep(name, ValueKind::text, [&](Value& v) { v.text = fallback; });
     const Value* v = value(name, {ValueKind::text}, "a string");
     return v ? v->text : fallback;
 }
 
 Vec3d Reader::vector(const std::string& name, Vec3d fallback) {
+    keep(name, ValueKind::vector, [&](Value& v) { v.vector = fallback; });
     const Value* v = value(name, {ValueKind::vector}, "a point or vector");
     return v ? v->vector : fallback;
 }
 
 Matrix Reader::transform(const std::string& name) {
+    keep(name, ValueKind::transform, [](Value&) {});
     const Value* v = value(name, {ValueKind::transform}, "a transform");
     return v ? v->transform : Matrix{};
 }
@@ -135,6 +165,8 @@ float Reader::ior(const std::string& name, const std::string& fallback) {
     const Value* v =
         value(name, {ValueKind::number, ValueKind::integer, ValueKind::text}, "a number or the name of a material");
     float result = 1;
+    find_ior(fallback, result);
+    keep(name, ValueKind::number, [&](Value& kept) { kept.number = double(result); });
     if (v && v->kind != ValueKind::text) {
         result = float(v->number);
     } else if (!find_ior(v ? v->text : fallback, result)) {
@@ -155,6 +187,7 @@ Where Reader::where(const std::string& name) const {
 Rgb Reader::color(const std::string& name, Rgb fallback, SpectrumUse use) {
     const Value* v =
         value(name, {ValueKind::rgb, ValueKind::spectrum, ValueKind::number, ValueKind::integer}, "a colour");
+    keep(name, ValueKind::rgb, [&](Value& kept) { kept.rgb = fallback; });
     if (!v) return fallback;
     Rgb rgb = splat(float(v->number));
     if (v->kind == ValueKind::rgb)
@@ -257,7 +290,7 @@ void Reader::leave(std::initializer_list<LeftOut> parameters, const std::string&
 
 std::string Reader::unknown(const Value& value, const Plugins& known) const {
     return fmt::format("unknown parameter '{}' of {} '{}'{}", value.name, object_.tag, object_.type,
-                       nearly(known, value.name));
+                       suggestion(known, value.name));
 }
 
 void Reader::fail_without(const std::string& name, const std::string& message) const {
@@ -267,16 +300,18 @@ void Reader::fail_without(const std::string& name, const std::string& message) c
 }
 
 void Reader::finish() {
+    Plugins known = absent_;
+    for (const Value* v : used_values_) known.push_back(v->name);
     for (const Value& v : object_.values)
         if (used_values_.count(&v))
             continue;
-        else if (object_.version < 2 || is_one_of(kMarks, v.name))
+        else if ((object_.version < 2 && !builder_.document.edits.contains(v.where.file)) || is_one_of(kMarks, v.name))
             builder_.note(v.where,
                           fmt::format("parameter '{}' of {}{} is not known and left out{}{}", v.name, object_.tag,
                                       object_.type.empty() ? "" : " '" + object_.type + "'",
-                                      object_.version < 2 ? ", as Mitsuba 0.6 does" : "", nearly(absent_, v.name)));
+                                      object_.version < 2 ? ", as Mitsuba 0.6 does" : "", suggestion(known, v.name)));
         else
-            builder_.refuse(v.where, unknown(v, absent_), "it is ignored");
+            builder_.refuse(v.where, unknown(v, known), "it is ignored");
     for (const Child& child : object_.children)
         if (!used_children_.count(&child))
             builder_.refuse(child.where,

@@ -120,6 +120,24 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
     if (job.light_back) move_behind(job.world);
 }
 
+Matrix local_form(Reader& in, const std::string& type) {
+    const double radius = type == "disk" ? 1 : in.number("radius", 1);
+    if (!(radius > 0)) in.fail(in.where("radius"), "radius must be positive");
+    if (type == "sphere") {
+        const Vec3d c = in.vector("center", {0, 0, 0});
+        return translation(c.x, c.y, c.z) * scaling(radius, radius, radius);
+    }
+    if (type == "disk") return {};
+    const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
+    const double l = length(p1 - p0);
+    if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
+    // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
+    const Vec3d n = unit(p1 - p0);
+    const double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+    const Vec3d s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, t = {b, sign + n.y * n.y * a, -n.y};
+    return from_columns(s, t, n, p0) * scaling(radius, radius, l);
+}
+
 Quadric make_quadric(Builder& builder, const Job& job) {
     Quadric q{};
     q.type = job.type == "sphere" ? PrimitiveType::sphere

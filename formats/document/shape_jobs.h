@@ -12,6 +12,7 @@ struct MeshSource {
     bool flip_v = false;
     int shape_index = 0;
     bool lacks_materials = false;  ///< obj: its shape would have them from an .mtl file, if there is one
+    std::string key;               ///< what its content depends on
     Mesh mesh;
     const Mesh* given = nullptr;  ///< of the document, instead of `mesh`
     Sha256Digest digest{};
@@ -31,6 +32,7 @@ struct Job {
     bool light_back = false;   ///< lies just behind another shape (Document::light_backs)
     double smooth_angle = -1;  ///< not negative: vertex normals are made anew, but not over sharper edges; degrees
     int group = -1;            ///< its place in the groups: of instances, and of meshes that instances share
+    uint32_t origin = 0;       ///< which of the shapes of the document it is, or a copy of
     // Result for meshes.
     Mesh world;
     uint32_t dropped = 0;
@@ -81,6 +83,8 @@ void reserve_meshes(const std::vector<Job>& jobs, Scene& scene);
 /// Puts the mesh of a job into the scene, as that of the shape with this index.
 void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape);
 
+/// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
+Matrix local_form(Reader& in, const std::string& type);
 /// Sphere, disk or cylinder.
 Quadric make_quadric(Builder& builder, const Job& job);
 

@@ -23,12 +23,27 @@ struct ShapeBuilder {
     std::vector<Job> jobs;
     std::vector<GroupJobs> groups;
     std::map<const Object*, int> group_of;
+    /// The shapes of the document in the order in which they are met, and what KeptGeometry::keys has of them.
+    std::vector<std::pair<uint32_t, uint32_t>> materials_and_emitters;
+    std::vector<std::string> keys;
+    bool keys_tell_all = true;
 
+    /// A mesh of the document.
+    int add_given(Reader& in, const std::string& name) {
+        MeshSource source;
+        source.type = in.object().type;
+        source.given = builder.document.mesh(name);
+        if (!source.given) in.fail("the document has no mesh '" + name + "'");
+        return add_source(std::move(source), "mesh " + name);
+    }
     int add_source(MeshSource source, const std::string& key) {
         const auto [it, added] = source_by_key.try_emplace(key, int(sources.size()));
+        source.key = key;
         if (added) sources.push_back(std::move(source));
         return it->second;
     }
+    void add_job(Job job, bool in_group);
+    bool take_over();
 
     void add_shape(const Object& object, const Matrix& outer, bool in_group);
     bool add_shapes_inside(Reader& in, const Matrix& outer, bool in_group);
@@ -47,25 +62,6 @@ bool is_tessellated(const std::string& type) {
     return type == "sdfgrid" || type == "linearcurve" || type == "bsplinecurve" || type == "heightfield";
 }
 bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
-
-/// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
-Matrix local_form(Reader& in, const std::string& type) {
-    const double radius = type == "disk" ? 1 : in.number("radius", 1);
-    if (!(radius > 0)) in.fail(in.where("radius"), "radius must be positive");
-    if (type == "sphere") {
-        const Vec3d c = in.vector("center", {0, 0, 0});
-        return translation(c.x, c.y, c.z) * scaling(radius, radius, radius);
-    }
-    if (type == "disk") return {};
-    const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
-    const double l = length(p1 - p0);
-    if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
-    // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
-    const Vec3d n = unit(p1 - p0);
-    const double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
-    const Vec3d s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, t = {b, sign + n.y * n.y * a, -n.y};
-    return from_columns(s, t, n, p0) * scaling(radius, radius, l);
-}
 
 /// Of an object that is made of others. False if it is none.
 bool ShapeBuilder::add_shapes_inside(Reader& in, const Matrix& outer, bool in_group) {
@@ -108,7 +104,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     Reader in(builder, object);
     if (add_shapes_inside(in, outer, in_group)) return;
     const std::string& type = object.type;
-    const bool given = type == "mesh" && !builder.document.meshes.empty();
+    const bool given = type == "mesh" && builder.document.has_meshes();
     if (!is_one_of(shape_plugins(), type) && !given) {
         builder.refuse(object.where, "shape type '" + type + "' is not supported" + what_is_meant("shape", type),
                        "the shape is left out");
@@ -139,7 +135,27 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     in.leave({{"shutter_open", "0"}, {"shutter_close", "0"}}, "nothing moves");
     if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();
-    check_shapes(builder.options.limits, jobs.size() + 1, object.where);
+    add_job(std::move(job), in_group);
+}
+
+/// The bytes of a value that has no others.
+template <class T>
+void append_bytes(std::string& text, const T& value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void ShapeBuilder::add_job(Job job, bool in_group) {
+    check_shapes(builder.options.limits, jobs.size() + 1, job.where);
+    std::string key = job.type + '|';
+    if (job.source >= 0) key += sources[size_t(job.source)].key;
+    for (const auto& row : job.to_world.m)
+        for (const double m : row) append_bytes(key, m);
+    append_bytes(key, job.smooth_angle);
+    append_bytes(key, job.group);
+    for (const bool flag : {in_group, job.flip, job.face_normals, job.reverse, job.light_back}) key += flag ? '1' : '0';
+    job.origin = uint32_t(keys.size());
+    keys.push_back(std::move(key));
+    materials_and_emitters.emplace_back(job.material, job.emitter);
     jobs.push_back(std::move(job));
 }
 
@@ -153,6 +169,7 @@ uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object
     source.mesh = with_attribute_atlas(builder, source.path.empty() ? job.where.file : source.path, mesh, textures);
     source.path.clear();
     job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
+    keys_tell_all = false;
     builder.attribute_textures = &textures;
     const uint32_t material = build_own_material(builder, bsdf);
     builder.attribute_textures = nullptr;
@@ -166,12 +183,7 @@ void ShapeBuilder::read_geometry(Reader& in, Job& job) {
         job.to_world = job.to_world * local_form(in, job.type);
     } else if (job.type == "mesh") {
         const std::string name = in.text("name", "");
-        const auto mesh = builder.document.meshes.find(name);
-        if (mesh == builder.document.meshes.end()) in.fail("the document has no mesh '" + name + "'");
-        MeshSource source;
-        source.type = job.type;
-        source.given = &mesh->second;
-        job.source = add_source(std::move(source), "mesh " + name);
+        job.source = add_given(in, name);
     } else {
         MeshSource source;
         source.type = job.type;
@@ -182,6 +194,14 @@ void ShapeBuilder::read_geometry(Reader& in, Job& job) {
 }
 
 void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
+    job.face_normals = in.boolean("face_normals", false);
+    job.smooth_angle = in.number("max_smooth_angle", -1);
+    if (in.has("max_smooth_angle") && !(job.smooth_angle >= 0 && job.smooth_angle <= 180))
+        in.fail(in.where("max_smooth_angle"), "max_smooth_angle must lie between 0 and 180 degrees");
+    if (builder.document.has_meshes() && in.has("mesh")) {
+        job.source = add_given(in, in.text("mesh", ""));
+        return;
+    }
     MeshSource source;
     const std::string name = in.text("filename", "");
     if (name.empty()) in.fail_without("filename", job.type + " shape has no filename");
@@ -190,10 +210,6 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
     source.flip_v = in.boolean("flip_tex_coords", job.type == "obj");
     if (job.type == "serialized")
         source.shape_index = int(std::clamp<int64_t>(in.integer("shape_index", 0), -1, 1 << 30));
-    job.face_normals = in.boolean("face_normals", false);
-    job.smooth_angle = in.number("max_smooth_angle", -1);
-    if (in.has("max_smooth_angle") && !(job.smooth_angle >= 0 && job.smooth_angle <= 180))
-        in.fail(in.where("max_smooth_angle"), "max_smooth_angle must lie between 0 and 180 degrees");
     if (job.type == "obj") read_obj_parts(builder, in, source);
     const std::string key = source.path + "|" + std::to_string(source.flip_v) + "|" +
                             std::to_string(source.shape_index) + "|" + std::to_string(source.lacks_materials);
@@ -229,7 +245,7 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     source.type = job.type;
     if (field) {
         const Texels texels = read_image(path, bytes, limits);
-        note_image(builder.scene.notes, path, texels);
+        note_image(builder.scene.notes, path, texels.notes);
         source.mesh = mesh_of_image(path, texels, scale, smooth, limits);
     } else if (grid) {
         source.mesh = mesh_of_grid(path, read_distance_grid(path, bytes, limits),
@@ -279,18 +295,39 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
         groups.push_back({std::exchange(jobs, std::move(others)), {}, {}});
     }
     job.group = known->second;
-    check_shapes(builder.options.limits, jobs.size() + 1, object.where);
-    jobs.push_back(std::move(job));
+    add_job(std::move(job), false);
 }
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
 
-}  // namespace
+/// The geometry of the scene before, if that has the same shapes in the same places.
+bool ShapeBuilder::take_over() {
+    const Kept* before = builder.before;
+    if (!before || keys.empty() || before->geometry.keys != keys) return false;
+    const KeptGeometry& geometry = builder.geometry = before->geometry;
+    const Scene& old = before->scene;
+    Scene& scene = builder.scene;
+    for (uint32_t i = 0; i < old.shapes.size(); ++i)  // a light that has no area: to be refused where it is placed
+        if (!old.shapes[i].primitive_count && materials_and_emitters[geometry.of_shape[i]].second != kNone)
+            return false;
+    scene.vertices = old.vertices, scene.triangles = old.triangles, scene.quadrics = old.quadrics;
+    scene.groups = old.groups, scene.instances = old.instances, scene.shapes = old.shapes;
+    scene.degenerate_triangles = old.degenerate_triangles;
+    for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+        const auto [material, emitter] = materials_and_emitters[geometry.of_shape[i]];
+        scene.shapes[i].material = material, scene.shapes[i].emitter = emitter;
+        if (emitter != kNone) scene.emitters[emitter].shape = i;
+    }
+    builder.take_memory(geometry.memory, scene.path);
+    const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    add(builder.file_digests, geometry.digests);
+    add(scene.warnings, geometry.warnings);
+    add(scene.notes, geometry.notes);
+    return true;
+}
 
-void build_shapes(Builder& builder, const Object& root) {
-    ShapeBuilder shapes{builder, {}, {}, {}, {}, {}};
-    for (const Child& child : root.children)
-        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false);
+/// Reads the meshes, and puts all into the scene.
+void place_shapes(Builder& builder, ShapeBuilder& shapes) {
     load_sources(builder, shapes.sources, shapes.jobs, shapes.groups);
     place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
     // Shapes get meshes of their own, and so does the scene.
@@ -326,10 +363,31 @@ void build_shapes(Builder& builder, const Object& root) {
             scene.quadrics.push_back(q);
         }
         scene.shapes.push_back(shape);
+        builder.geometry.of_shape.push_back(job.origin);
     }
     for (const Quadric& q : scene.quadrics) scene.shapes[q.shape].first_primitive += uint32_t(scene.triangles.size());
     group_ends.push_back(uint32_t(scene.triangles.size()));
     add_instances(builder, shapes.groups, group_ends);
+}
+
+}  // namespace
+
+void build_shapes(Builder& builder, const Object& root) {
+    ShapeBuilder shapes{builder, {}, {}, {}, {}, {}, {}, {}};
+    for (const Child& child : root.children)
+        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false);
+    if (!shapes.keys_tell_all) shapes.keys.clear();
+    if (shapes.take_over()) return;
+    const auto digests = ptrdiff_t(builder.file_digests.size()), warnings = ptrdiff_t(builder.scene.warnings.size()),
+               notes = ptrdiff_t(builder.scene.notes.size());
+    const uint64_t memory = builder.memory;
+    place_shapes(builder, shapes);
+    KeptGeometry& kept = builder.geometry;
+    kept.keys = std::move(shapes.keys);
+    kept.digests.assign(builder.file_digests.begin() + digests, builder.file_digests.end());
+    kept.warnings.assign(builder.scene.warnings.begin() + warnings, builder.scene.warnings.end());
+    kept.notes.assign(builder.scene.notes.begin() + notes, builder.scene.notes.end());
+    kept.memory = builder.memory - memory;
 }
 
 const Plugins& shape_plugins() {

@@ -166,10 +166,12 @@ void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& te
 }  // namespace
 
 const Texels* given_image(const Builder& builder, Reader& in) {
-    if (builder.document.images.empty() || !in.has("image")) return nullptr;
-    const auto image = builder.document.images.find(in.text("image", ""));
-    if (image == builder.document.images.end()) in.fail("the document has no image of that name");
-    return &image->second;
+    const Document& document = builder.document;
+    const bool none = document.images.empty() && document.given_images.empty() && !document.first;
+    if (none || !in.has("image")) return nullptr;
+    const Texels* image = document.image(in.text("image", ""));
+    if (!image) in.fail("the document has no image of that name");
+    return image;
 }
 
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {

@@ -143,7 +143,7 @@ private:
         document::Plugins names;
         for (const auto& property : of->properties) names.push_back(property.first);
         context.note(fmt::format("property '{}' of {} is not known and left out{}", key,
-                                 of->name == "map" ? "a texture" : of->name, document::nearly(names, key)));
+                                 of->name == "map" ? "a texture" : of->name, suggestion(names, key)));
         return nullptr;
     }
 };
@@ -160,7 +160,7 @@ void check_names(Context& context, std::string_view json) {
         if (is_extension(kind)) known.push_back(kind);
     for (const std::string& name : extensions)
         if (!document::is_one_of(known, name))
-            context.leave_out(name, "extension '" + name + "'", document::nearly(known, name));
+            context.leave_out(name, "extension '" + name + "'", suggestion(known, name));
 }
 
 }  // namespace ambilux::gltf

@@ -120,7 +120,7 @@ struct Expander {
         if (document.files.size() > document.limits.includes)
             document::fail(from, "more files than --limits includes=" + std::to_string(document.limits.includes));
         std::string content = read_input(file, document.limits);
-        document.files.push_back({file, content});
+        document.files.push_back({file, std::make_shared<const std::string>(content)});
         content = plain_text_of_utf16(file, content);
         content.erase(0, behind(content, 0, "<?xml", "?>"));
         // A file that is no XML stays out of values, and so out of messages.

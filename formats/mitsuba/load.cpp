@@ -9,9 +9,9 @@ namespace {
 
 /// Of a file or, if there is one, of a text.
 Scene scene_of(const std::string& path, const LoadOptions& options, const std::string* text) {
-    document::Document document;
+    const auto document = std::make_shared<document::Document>();
     return load_through(document, path, options,
-                        [&] { mitsuba::parse_document(document, path, options.parameters, text); });
+                        [&] { mitsuba::parse_document(*document, path, options.parameters, text); });
 }
 
 }  // namespace

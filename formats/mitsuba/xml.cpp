@@ -1,5 +1,7 @@
 #include "formats/mitsuba/xml.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <set>
@@ -136,15 +138,21 @@ struct Parser {
 
         check_includes(document.files.size(), from);
         if (depth > 1) document.included_from.try_emplace(path, from);
-        parse_text(path, read_input(path, document.limits), depth);
+        parse_scene(path, read_input(path, document.limits), depth);
         open_files.pop_back();
     }
 
-    void parse_text(const std::string& path, const std::string& text, uint64_t depth) {
-        document.files.push_back({path, text});
+    void parse_scene(const std::string& path, const std::string& text, uint64_t depth) {
+        document.files.push_back({path, std::make_shared<const std::string>(text)});
+        parse_text(path, text, depth, document.scene);
+    }
+
+    /// Into `to`, which is made if it is null. What is not the document's scene stands in no file.
+    void parse_text(const std::string& path, const std::string& text, uint64_t depth, Object*& to) {
         const std::string bytes = expand_entities(document, path, plain_text_of_utf16(path, text));
         XmlSource source;
         source.path = path;
+        source.has_lines = &to == &document.scene;
         for (size_t i = 0; i < bytes.size(); ++i)
             if (bytes[i] == '\n') source.line_ends.push_back(ptrdiff_t(i));
         pugi::xml_document xml;
@@ -164,11 +172,11 @@ struct Parser {
                 fail(where(source, root),
                      "'" + version + "' is no version that is known (0.5 to " + std::to_string(kNewestVersion) + ".x)");
         }
-        if (!document.scene) {
-            document.scene = &add_object(document, "scene", "", where(source, root));
-            document.scene->version = source.version;
+        if (!to) {
+            to = &add_object(document, "scene", "", where(source, root));
+            to->version = source.version;
         }
-        parse_children(source, root, *document.scene, depth);
+        parse_children(source, root, *to, depth);
     }
 
     void resolve_references() {
@@ -178,7 +186,7 @@ struct Parser {
                     const auto it = document.ids.find(child.ref);
                     if (it == document.ids.end())
                         fail(child.where,
-                             "reference to unknown id '" + child.ref + "'" + nearly(document.ids, child.ref));
+                             "reference to unknown id '" + child.ref + "'" + suggestion(document.ids, child.ref));
                     child.object = it->second;
                 }
         check_references(document);
@@ -196,12 +204,20 @@ void parse_document(Document& document, const std::string& path,
         given.insert(name);
     }
     if (text)
-        parser.parse_text(path, *text, 1);
+        parser.parse_scene(path, *text, 1);
     else
         parser.parse_file(path, {path, 0}, 1);
     for (const std::string& name : given)
         if (!parser.values.is_used(name)) throw input_error(path, 0, "the scene has no parameter '$" + name + "'");
     parser.resolve_references();
+}
+
+Object& parse_elements(Document& document, const std::string& name, const std::string& elements, int version) {
+    Parser parser{document, ValueParser(document), {}};
+    Object* holder = nullptr;
+    parser.parse_text(name, fmt::format("<scene version=\"{}.0.0\">{}</scene>", version, elements), 1, holder);
+    parser.resolve_references();
+    return *holder;
 }
 
 }  // namespace ambilux::mitsuba

@@ -16,4 +16,8 @@ std::string expand_entities(Document& document, const std::string& path, const s
 void parse_document(Document& document, const std::string& path,
                     const std::vector<std::pair<std::string, std::string>>& parameters, const std::string* text);
 
+/// Parses elements that stand in no file into the children and values of a new object, which belongs to nothing. `name`
+/// stands for the file in messages, `version` is that of the elements.
+Object& parse_elements(Document& document, const std::string& name, const std::string& elements, int version);
+
 }  // namespace ambilux::mitsuba

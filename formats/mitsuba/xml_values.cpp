@@ -40,7 +40,7 @@ Vec3d any_up(Vec3d d) {
 
 Where where(const XmlSource& source, ptrdiff_t offset) {
     const auto it = std::lower_bound(source.line_ends.begin(), source.line_ends.end(), offset);
-    return {source.path, int(it - source.line_ends.begin()) + 1};
+    return {source.path, source.has_lines ? int(it - source.line_ends.begin()) + 1 : 0};
 }
 Where where(const XmlSource& source, const pugi::xml_node& node) { return where(source, node.offset_debug()); }
 
@@ -86,7 +86,7 @@ void ValueParser::allow(const XmlSource& source, const pugi::xml_node& node, std
     for (const pugi::xml_attribute& a : node.attributes())
         if (std::none_of(names.begin(), names.end(), [&](const char* n) { return std::string(n) == a.name(); }))
             fail(where(source, node), std::string("unexpected attribute '") + a.name() + "' in <" + node.name() + ">" +
-                                          nearly({names.begin(), names.end()}, a.name()));
+                                          suggestion({names.begin(), names.end()}, a.name()));
 }
 
 std::string ValueParser::parameter_name(const XmlSource& source, const pugi::xml_node& node) {
@@ -157,7 +157,7 @@ Matrix ValueParser::parse_transform(const XmlSource& source, const pugi::xml_nod
             if (!is_affine(m)) fail(at, "<matrix> is not affine: its last row must be 0 0 0 1");
         } else {
             fail(at, std::string("unknown element <") + step.name() + "> in <transform>" +
-                         nearly({"translate", "scale", "rotate", "lookat", "matrix"}, tag));
+                         suggestion({"translate", "scale", "rotate", "lookat", "matrix"}, tag));
         }
         total = m * total;
     }
@@ -196,7 +196,7 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
     if (node.attribute("filename")) {
         const std::string path = document_.resolve(attribute(source, node, "filename"), at);
         const std::string bytes = read_input(path, document_.limits);
-        document_.files.push_back({path, bytes});
+        document_.files.push_back({path, std::make_shared<const std::string>(bytes)});
         const std::string plain = plain_text(path, bytes);
         TextCursor cursor(plain);
         for (; !cursor.done(); cursor.next_line()) {

@@ -16,6 +16,7 @@ namespace ambilux::mitsuba {
 struct XmlSource {
     std::string path;
     std::vector<ptrdiff_t> line_ends;
+    bool has_lines = true;  ///< which messages name
     int version = 3;
 };
 

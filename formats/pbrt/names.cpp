@@ -35,7 +35,7 @@ document::Plugins all_of(const std::string& kind) {
 bool is_known(const std::string& kind, const std::string& name) { return document::is_one_of(all_of(kind), name); }
 
 std::string nearly_known(const std::string& kind, const std::string& name) {
-    return is_known(kind, name) ? "" : document::nearly(all_of(kind), name);
+    return is_known(kind, name) ? "" : suggestion(all_of(kind), name);
 }
 
 std::string not_supported(const std::string& kind, const std::string& name) {

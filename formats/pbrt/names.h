@@ -22,7 +22,7 @@ template <class T>
 const T& known_as(const std::map<std::string, T>& all, const std::string& name, const document::Where& where,
                   const std::string& what) {
     const auto known = all.find(name);
-    if (known == all.end()) document::fail(where, "unknown " + what + " '" + name + "'" + document::nearly(all, name));
+    if (known == all.end()) document::fail(where, "unknown " + what + " '" + name + "'" + suggestion(all, name));
     return known->second;
 }
 

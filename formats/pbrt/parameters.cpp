@@ -178,13 +178,12 @@ std::string Parameters::filename() const {
     const std::string name = text("filename", "");
     if (!name.empty()) return name;
     for (const Parameter& p : list)
-        if (!p.used && document::nearest_name({"filename"}, p.name) == "filename")
-            fail(p.where, unknown(p, {"filename"}));
+        if (!p.used && nearest_name({"filename"}, p.name) == "filename") fail(p.where, unknown(p, {"filename"}));
     fail(where, directive + " '" + type + "' has no filename");
 }
 
 std::string Parameters::unknown(const Parameter& p, const std::vector<std::string>& known) const {
-    return "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" + document::nearly(known, p.name);
+    return "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" + suggestion(known, p.name);
 }
 
 void Parameters::finish(Report& report) const {

@@ -32,7 +32,7 @@ const Texture& Textures::named(const Parameter& p, bool is_float) const {
     const auto it = known.find(p.strings[0]);
     if (it == known.end())
         fail(p.where, "no texture of type " + std::string(is_float ? "float" : "spectrum") + " is known by the name '" +
-                          p.strings[0] + "'" + document::nearly(known, p.strings[0]));
+                          p.strings[0] + "'" + suggestion(known, p.strings[0]));
     return it->second;
 }
 

@@ -11,8 +11,9 @@ from ambilux._core import __version__, cuda_available, git_revision, settings_he
 from ambilux.errors import AmbiluxWarning, DeviceError, SceneError, UsageError
 from ambilux.experiments import Results, experiment
 from ambilux.image import DeviceArray, Image, compare, read
+from ambilux.params import Params
 from ambilux.rendering import Step, progressive, reference, render
 from ambilux.scene import Scene, load
 
-__all__ = ["AmbiluxWarning", "DeviceArray", "DeviceError", "Image", "Results", "Scene", "SceneError", "Step", "UsageError", "__version__", "compare", "cuda_available",
+__all__ = ["AmbiluxWarning", "DeviceArray", "DeviceError", "Image", "Params", "Results", "Scene", "SceneError", "Step", "UsageError", "__version__", "compare", "cuda_available",
            "experiment", "git_revision", "load", "progressive", "read", "reference", "render", "settings_help"]

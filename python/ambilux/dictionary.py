@@ -5,18 +5,21 @@ An element stands in one line, so that the line of an error names its key.
 
 from __future__ import annotations
 
-import difflib
 import numbers
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
+from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 from ambilux import _core
+from ambilux.arrays import numbers_of, plain
 from ambilux.errors import SceneError
 
 TAG_OF: dict[str, str] = _core.plugins()  # of each type that the reader of scene files knows
 COLOURS = ("rgb", "srgb", "spectrum")
+#: Keys of arrays in memory.
+MESH_KEYS, IMAGE_KEY = ("vertex_positions", "vertex_normals", "vertex_texcoords", "faces"), "data"
 
 
 class Lines:
@@ -25,6 +28,9 @@ class Lines:
     def __init__(self) -> None:
         self.text: list[str] = []
         self.paths: list[str] = []
+        #: By the ids of their objects.
+        self.meshes: dict[str, dict[str, Any]] = {}
+        self.images: dict[str, Any] = {}
 
     def add(self, text: str, path: str) -> None:
         self.text.append(text)
@@ -37,13 +43,8 @@ def fail(path: str, message: str) -> None:
 
 def number_list(value: Any) -> list[float] | None:
     """Of a sequence or array of numbers; None of anything else."""
-    if isinstance(value, (str, bytes, Mapping)):
-        return None
-    try:
-        flat = [x for row in value for x in (row if hasattr(row, "__len__") else [row])]
-    except TypeError:
-        return None
-    return [float(x) for x in flat] if all(isinstance(x, numbers.Real) for x in flat) else None
+    array = None if isinstance(value, Mapping) else numbers_of(value)
+    return array.ravel().tolist() if array is not None and array.ndim else None
 
 
 def joined(values: list[float]) -> str:
@@ -109,6 +110,7 @@ def add_colour(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> 
 
 
 def add_value(lines: Lines, name: str, value: Any, path: str) -> None:
+    value = plain(value)
     if isinstance(value, Mapping) and value.get("type") in COLOURS:
         add_colour(lines, name, value, path)
     elif isinstance(value, Mapping) and value.get("type") == "ref":
@@ -136,41 +138,109 @@ def add_value(lines: Lines, name: str, value: Any, path: str) -> None:
 
 def alternative(kind: str) -> str:
     """The nearest known type, for somebody who mistyped it."""
-    near = difflib.get_close_matches(kind, TAG_OF, 1)
-    return f"; is {near[0]} ({TAG_OF[near[0]]}) meant?" if near else ""
+    near = _core.nearest_name(list(TAG_OF), kind)
+    return f"; is {near} ({TAG_OF[near]}) meant?" if near else ""
 
 
 def add_object(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> None:
     kind = value.get("type")
     if not isinstance(kind, str):
         fail(path, "an object has a type")
-    tag = TAG_OF.get(kind)
+    tag = "shape" if kind == "mesh" else TAG_OF.get(kind)
     if tag is None:
         fail(f"{path}.type", f"unknown type '{kind}'{alternative(kind)}")
-    attributes = {"type": kind}
+    attributes = {"type": "ply" if kind == "mesh" else kind}
     depth = path.count(".")
-    if depth == 0 or "id" in value:
-        attributes["id"] = str(value.get("id", name))
+    arrays = [key for key in (MESH_KEYS if tag == "shape" else (IMAGE_KEY,) if kind in ("bitmap", "envmap") else ()) if key in value]
+    if depth == 0 or "id" in value or arrays:
+        attributes["id"] = str(value.get("id", name if depth == 0 else path.lstrip(".")))
+    if arrays and tag == "shape":
+        lines.meshes[attributes["id"]] = {key: value[key] for key in arrays}
+    elif arrays:
+        lines.images[attributes["id"]] = value[IMAGE_KEY]
     # Names of objects matter where they are parameters, such as textures and BSDFs inside of others.
     if depth and re.fullmatch(r"[a-z_]\w*", name) and tag in ("texture", "bsdf"):
         attributes["name"] = name
     lines.add(element(tag, "", **attributes), path)
     for key, inner in value.items():
-        if key not in ("type", "id"):
+        if key not in ("type", "id", *arrays):
             add_value(lines, str(key), inner, f"{path}.{key}")
     lines.add(f"</{tag}>", path)
 
 
 def to_xml(scene: Mapping[str, Any]) -> Lines:
-    """The scene as XML of format 3."""
+    """The scene as XML, of format 3 unless the dictionary has a version."""
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
         fail("type", "a scene is a dictionary with 'type': 'scene'")
     lines = Lines()
-    lines.add('<scene version="3.0.0">', "type")
+    lines.add(element("scene", "", version=str(scene.get("version", "3.0.0"))), "type")
     for key, value in scene.items():
-        if key != "type":
+        if key not in ("type", "version"):
             if not isinstance(value, Mapping):
                 fail(str(key), "a scene holds objects, which are dictionaries")
             add_object(lines, str(key), value, str(key))
     lines.add("</scene>", "type")
     return lines
+
+
+def floats(text: str) -> list[float]:
+    return [float(word) for word in text.replace(",", " ").split()]
+
+
+def value_of(node: ElementTree.Element, core: _core.Scene) -> Any:
+    """What an element of the scene's XML stands for."""
+    text = node.get("value", "")
+    if node.tag == "boolean":
+        return text == "true"
+    if node.tag in ("integer", "float"):
+        return int(text) if node.tag == "integer" else float(text)
+    if node.tag in ("string", "vector"):
+        return text if node.tag == "string" else floats(text)
+    if node.tag == "transform":
+        matrix = floats(node[0].get("value", ""))
+        return [matrix[i:i + 4] for i in range(0, 16, 4)]
+    if node.tag == "ref":
+        return {"type": "ref", "id": node.get("id")}
+    if node.tag in COLOURS:
+        pairs = [[float(x) for x in pair.split(":")] for pair in text.split(",")] if ":" in text else None
+        numbers = floats(text) if pairs is None else pairs
+        return {"type": node.tag, "value": numbers[0] if len(numbers) == 1 else numbers}
+    return object_of(node, core)
+
+
+def unused(base: str, taken: Mapping[str, Any]) -> str:
+    """`base`, or with a number from 2 on where it is taken."""
+    number, key = 2, base
+    while key in taken:
+        key, number = f"{base}_{number}", number + 1
+    return key
+
+
+def object_of(node: ElementTree.Element, core: _core.Scene) -> dict[str, Any]:
+    out: dict[str, Any] = {"type": node.get("type", "")}
+    if node.get("id"):
+        out["id"] = node.get("id")
+    for inner in node:
+        out[unused(inner.get("name") or inner.tag, out)] = value_of(inner, core)
+    if node.tag == "shape" and str(out.get("mesh", "")).startswith("array "):
+        arrays = core.mesh(out.pop("mesh"))
+        origin = arrays.pop("origin")
+        out.update({name: array for name, array in arrays.items() if len(array)})
+        if any(origin):
+            out["vertex_positions"] = arrays["vertex_positions"] + origin
+    if str(out.get("image", "")).startswith("array "):
+        out[IMAGE_KEY] = core.image(out.pop("image"))[0]
+    return out
+
+
+def from_xml(text: str, core: _core.Scene) -> dict[str, Any]:
+    """The dictionary of a scene that the core wrote as XML."""
+    root = ElementTree.fromstring(text)
+    scene: dict[str, Any] = {"type": "scene"}
+    if root.get("version") != "3.0.0":
+        scene["version"] = root.get("version")
+    for node in root:
+        key = unused(node.get("id") or node.tag, scene)
+        scene[key] = value_of(node, core)
+        scene[key].pop("id", None)
+    return scene

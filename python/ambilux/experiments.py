@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
+import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ambilux import _core
-from ambilux.errors import SceneError
+from ambilux.arrays import plain
+from ambilux.errors import SceneError, UsageError
 
 
 class Results:
@@ -42,9 +47,50 @@ class Results:
     def __repr__(self) -> str:
         return f"<ambilux.Results {self.folder}>"
 
+    def _repr_html_(self) -> str:
+        return str(self.table.to_html(index=False))
 
-def experiment(config: str | os.PathLike[str], out: str | os.PathLike[str], *, references: str | os.PathLike[str] = "", resume: bool = False,
-               reduced: bool = False, quiet: bool = True) -> Results:
-    """Runs an experiment as `ambilux experiment CONFIG -o OUT`. An interrupt saves what is finished; `resume=True` goes on."""
-    _core.experiment(os.fspath(config), os.fspath(out), os.fspath(references), resume, reduced, quiet)
+
+def toml_text(value: Any) -> str:
+    """A value as TOML has it in one line."""
+    value = plain(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(str(k))} = {toml_text(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(toml_text, value)) + "]"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str) or hasattr(value, "__fspath__"):
+        return json.dumps(os.fspath(value))
+    raise UsageError(f"{value!r}: a configuration has texts, numbers, truth values, lists and dictionaries")
+
+
+@contextlib.contextmanager
+def config_file(config: str | os.PathLike[str] | Mapping[str, Any]) -> Iterator[str]:
+    """The file of a configuration, which is written if it is a dictionary; names of files in that are those of this process."""
+    if not isinstance(config, Mapping):
+        yield os.fspath(config)
+        return
+    scenes = [{**s, "path": os.path.abspath(s["path"])} if isinstance(s, Mapping) and "path" in s else s for s in config.get("scene", [])]
+    lines = [f"{json.dumps(str(k))} = {toml_text(v)}" for k, v in {**config, "scene": scenes}.items()]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"{config.get('name', 'experiment')}.toml")
+        path.write_text("\n".join(lines) + "\n")
+        yield str(path)
+
+
+def experiment(config: str | os.PathLike[str] | Mapping[str, Any], out: str | os.PathLike[str] | None = None, *, references: str | os.PathLike[str] = "",
+               resume: bool = False, reduced: bool = False, quiet: bool = True, dry_run: bool = False) -> Results | str:
+    """Runs an experiment as `ambilux experiment CONFIG -o OUT`; `config` is a file or a dictionary of the same keys. An interrupt saves what is finished;
+    `resume=True` goes on. With `dry_run` it says what would be done, and with which time and memory, and writes nothing."""
+    with config_file(config) as path:
+        if dry_run:
+            return _core.plan(path, reduced)
+        if out is None:
+            raise UsageError("an experiment needs a folder for its results, unless dry_run is True")
+        _core.experiment(path, os.fspath(out), os.fspath(references), resume, reduced, quiet)
     return Results(out)

@@ -11,6 +11,7 @@
 namespace ambilux {
 
 void bind_images(nanobind::module_& m);
+void bind_scenes(nanobind::module_& m);
 void bind_renders(nanobind::module_& m);
 
 /// Does the work on a thread of its own, without Python's lock, and looks at Python's signals meanwhile: one whose

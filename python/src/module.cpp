@@ -12,6 +12,7 @@
 #include "cli/program.h"
 #include "core/error.h"
 #include "core/flag.h"
+#include "core/nearest.h"
 #include "core/version.h"
 #include "formats/document/plugins.h"
 #include "integrators/settings_help.h"
@@ -95,7 +96,10 @@ NB_MODULE(_core, m) {
     m.def("cuda_available", &cuda_available, "True if this build has the CUDA backend and a device answers.");
     m.def("settings_help", &settings_help, "All settings and variants, as `ambilux help settings`.");
     m.def("plugins", &document::plugins, "Tags of the objects that scene files can have, by their types.");
+    m.def("nearest_name", &nearest_name, nb::arg("known"), nb::arg("name"),
+          "The one of these that may be meant; empty if none.");
     m.def("main", &main_with, nb::arg("arguments"), "Runs the program; returns its exit code.");
     bind_images(m);
+    bind_scenes(m);
     bind_renders(m);
 }

@@ -1,4 +1,4 @@
-// Scenes, renders step by step, references and experiments.
+// Renders step by step, references and experiments.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -12,12 +12,13 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/outputs.h"
+#include "experiments/dry_run.h"
 #include "experiments/reference_store.h"
 #include "experiments/runner.h"
-#include "formats/load.h"
 #include "integrators/warnings.h"
 #include "python/src/bindings.h"
-#include "scene/info.h"
+#include "python/src/loaded_scene.h"
+#include "render/shared_renderer.h"
 #include "session/render_plan.h"
 #include "session/statistics.h"
 
@@ -26,36 +27,6 @@ using namespace nb::literals;
 
 namespace ambilux {
 namespace {
-
-using Assignments = std::vector<std::pair<std::string, std::string>>;
-
-struct LoadedScene {
-    Scene scene;
-    std::vector<std::string> files;
-    double seconds = 0;
-};
-using SharedScene = std::shared_ptr<LoadedScene>;
-
-/// `text`, if given, is what a file at `path` would hold.
-SharedScene load(const std::string& path, std::optional<std::string> text, const Assignments& parameters,
-                 std::pair<uint32_t, uint32_t> size, bool lenient, bool uniform_picking,
-                 const std::vector<std::string>& limits) {
-    auto loaded = std::make_shared<LoadedScene>();
-    LoadOptions options;
-    options.parameters = parameters;
-    options.width = size.first;
-    options.height = size.second;
-    options.lenient = lenient;
-    options.light_picking = uniform_picking ? LightPicking::uniform : LightPicking::power;
-    options.files = &loaded->files;
-    for (const std::string& limit : limits) set_limit(options.limits, limit);
-    run_unlocked([&](const volatile bool*) {
-        const auto start = std::chrono::steady_clock::now();
-        loaded->scene = text ? load_mitsuba_text(*text, path, options) : load_scene_file(path, options);
-        loaded->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    });
-    return loaded;
-}
 
 RenderSettings settings_of(const Scene& scene, const Assignments& assignments) {
     RenderSettings settings = default_settings(scene);
@@ -70,7 +41,10 @@ public:
         : scene_(std::move(scene)), settings_(settings_of(scene_->scene, assignments)),
           budget_(render_budget(spp, time, scene_->scene, "")) {
         expect(settings_, budget_);
-        run_unlocked([&](const volatile bool*) { renderer_ = make_renderer(scene_->scene, settings_); });
+        run_unlocked([&](const volatile bool*) {
+            SharedAccels accels(scene_->scene, scene_->structures);
+            renderer_ = make_renderer(scene_->scene, settings_, accels);
+        });
         position_ = first_position(*renderer_);
     }
 
@@ -152,6 +126,19 @@ std::pair<Reference, std::string> reference(const SharedScene& scene, const std:
     return {std::move(result.reference), json_text(result.attributes)};
 }
 
+/// What an experiment would do.
+std::string plan(const std::string& config, bool reduced) {
+    ExperimentRequest request;
+    request.config = config;
+    request.reduced = reduced;
+    std::string text;
+    run_unlocked([&](const volatile bool* interrupt) {
+        request.interrupt = interrupt;
+        text = describe_plan(request, default_hooks());
+    });
+    return text;
+}
+
 void experiment(const std::string& config, const std::string& output, const std::string& references, bool resume,
                 bool reduced, bool quiet) {
     const bool before = is_quiet();
@@ -178,17 +165,6 @@ void experiment(const std::string& config, const std::string& output, const std:
 }  // namespace
 
 void bind_renders(nb::module_& m) {
-    nb::class_<LoadedScene>(m, "Scene")
-        .def_prop_ro("path", [](const LoadedScene& s) { return s.scene.path; })
-        .def_prop_ro(
-            "size",
-            [](const LoadedScene& s) { return std::pair(s.scene.sensor.crop_width, s.scene.sensor.crop_height); })
-        .def_prop_ro("warnings", [](const LoadedScene& s) { return s.scene.warnings; })
-        .def_prop_ro("hash", [](const LoadedScene& s) { return scene_hash(s.scene); })
-        .def_ro("seconds", &LoadedScene::seconds)
-        .def("info", [](const LoadedScene& s) { return json_text(scene_info(s.scene)); });
-    m.def("load", &load, "path"_a, "text"_a.none(), "parameters"_a, "size"_a, "lenient"_a, "uniform_picking"_a,
-          "limits"_a);
     nb::class_<Render>(m, "Render")
         .def(nb::init<SharedScene, const Assignments&, std::optional<uint64_t>, std::optional<double>>(), "scene"_a,
              "settings"_a, "spp"_a.none(), "time"_a.none())
@@ -204,6 +180,7 @@ void bind_renders(nb::module_& m) {
         .def_prop_ro("samples", &Render::samples)
         .def_prop_ro("seconds", &Render::seconds);
     m.def("reference", &reference, "scene"_a, "path"_a, "spp"_a, "settings"_a);
+    m.def("plan", &plan, "config"_a, "reduced"_a);
     m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a);
 }
 

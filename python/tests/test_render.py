@@ -69,7 +69,7 @@ def test_the_variance_is_that_of_samples(scene):
     assert abs(np.sum(ours - theirs)) < 5 * spread
     np.testing.assert_allclose(image.stderr**2 * 64, image.variance, rtol=1e-5)
     assert ambilux.render(scene, spp=1, backend="cpu").variance is None
-    assert ambilux.render(scene, spp=64, backend="cpu", sampler="sobol").variance is None  # samples depend on each other
+    assert ambilux.render(scene, spp=64, backend="cpu", settings={"sampler": "sobol"}).variance is None  # samples depend on each other
 
 
 def test_progressive_ends_with_the_image_of_render(scene):

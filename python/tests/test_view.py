@@ -1,5 +1,6 @@
 """`ambilux view`: what it serves, and its page in Chromium."""
 
+import io
 import json
 import re
 import shutil
@@ -42,19 +43,20 @@ def viewer(tmp_path_factory):
 
 
 def post(url, value, headers=None):
+    """Status, and the number of what is asked for or what is wrong with it."""
     request = urllib.request.Request(url, json.dumps(value).encode(), headers or {})
     try:
         with urllib.request.urlopen(request, timeout=20) as answer:
-            return answer.status, None
+            return answer.status, json.load(answer)["asked"]
     except urllib.error.HTTPError as e:
         return e.code, e.read().decode()
 
 
-def frame(url, wanted=lambda facts: True, seconds=30):
-    """The first frame that is wanted."""
+def frame(url, wanted=lambda facts: True, seconds=30, query=""):
+    """The first frame that is wanted, with pixels where they are no JPEG."""
     after, end = 0, time.monotonic() + seconds
     while time.monotonic() < end:
-        with urllib.request.urlopen(f"{url}frame?after={after}", timeout=20) as answer:
+        with urllib.request.urlopen(f"{url}frame?after={after}{query}", timeout=20) as answer:
             body = answer.read()
         if not body:
             continue
@@ -62,19 +64,20 @@ def frame(url, wanted=lambda facts: True, seconds=30):
         facts = json.loads(body[4:4 + length])
         after = facts["frame"]
         if wanted(facts):
-            return facts, np.frombuffer(body, np.uint8, offset=4 + length).reshape(facts["height"], facts["width"], 4)
+            pixels = np.frombuffer(body, np.uint8, offset=4 + length)
+            return facts, pixels.reshape(facts["height"], facts["width"], 3) if facts["format"] == "rgb" else pixels.tobytes()
     raise AssertionError("no such frame")
 
 
 def test_frames_become_the_image(viewer):
     facts, pixels = frame(viewer, lambda f: f["samples"] >= 256 and "error" in f)
-    assert pixels.shape == (72, 96, 4) and facts["problem"] == "" and facts["method"] == "path wavefront"
+    assert pixels.shape == (72, 96, 3) and facts["problem"] == "" and facts["method"] == "path wavefront"
     assert {"extend", "eye_vertex"} & {s["name"] for s in facts["stages"]} and facts["rays_per_second"] > 0
     assert 0 < facts["error"]["relmse_corrected"] < 10
     linear = ambilux.render(SCENES / "glass.xml", "bdpt", spp=32, size=(96, 72), backend="cpu").rgb.clip(0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055) * 255
-    assert abs(float(pixels[..., :3].mean()) - float(srgb.mean())) < 8
-    assert np.corrcoef(pixels[..., :3].ravel(), srgb.ravel())[0, 1] > 0.8
+    assert abs(float(pixels.mean()) - float(srgb.mean())) < 8
+    assert np.corrcoef(pixels.ravel(), srgb.ravel())[0, 1] > 0.8
 
 
 def test_a_method_and_what_is_wrong_with_one(viewer):
@@ -108,13 +111,39 @@ def test_the_camera_moves_and_returns(viewer):
     frame(viewer, lambda f: "error" in f)
 
 
+def test_a_picture_says_what_it_answers_and_what_it_took(viewer):
+    with urllib.request.urlopen(viewer + "scene") as answer:
+        camera = json.load(answer)["camera"]
+    numbers = []
+    for k in range(5):
+        asked = post(viewer + "camera", {**camera, "origin": [3.0, 1.5, 3.0 + 0.1 * k], "moving": True})[1]
+        facts, _ = frame(viewer, lambda f: f["asked"] >= asked)
+        numbers.append(asked)
+        assert facts["samples"] >= 1 and {"restart", "first_sample", "picture"} <= facts["picture_seconds"].keys()
+    assert numbers == sorted(set(numbers))
+    # The same camera at rest does not begin anew where the picture is whole already.
+    asked = post(viewer + "camera", {**camera, "origin": [3.0, 1.5, 3.4], "moving": False})[1]
+    assert frame(viewer, lambda f: f["asked"] >= asked)[0]["width"] == 96
+    assert post(viewer + "camera", {"reset": True})[0] == 200
+
+
+def test_a_jpeg_shows_the_same_picture(viewer):
+    image = pytest.importorskip("PIL.Image")
+    facts, sent = frame(viewer, lambda f: f["samples"] >= 64, query="&as=jpeg&quality=95")
+    assert facts["format"] == "jpeg" and facts["picture_seconds"]["jpeg"] > 0 and len(sent) < 96 * 72 * 3
+    shown = np.asarray(image.open(io.BytesIO(sent)).convert("RGB")).astype(int)
+    _, pixels = frame(viewer, lambda f: f["samples"] >= 64)
+    assert shown.shape == pixels.shape and np.abs(shown - pixels).mean() < 6
+    assert len(frame(viewer, query="&as=jpeg&quality=20")[1]) < len(sent)
+
+
 def test_exposure_does_not_begin_anew(viewer):
     facts, before = frame(viewer, lambda f: f["samples"] >= 4)
     assert post(viewer + "exposure", {"stops": -3})[0] == 200
     end = time.monotonic() + 10
-    while (later := frame(viewer))[1][..., :3].mean() > 0.7 * before[..., :3].mean() and time.monotonic() < end:
+    while (later := frame(viewer))[1].mean() > 0.7 * before.mean() and time.monotonic() < end:
         time.sleep(0.02)
-    assert later[1][..., :3].mean() < 0.7 * before[..., :3].mean() and later[0]["samples"] >= facts["samples"]
+    assert later[1].mean() < 0.7 * before.mean() and later[0]["samples"] >= facts["samples"]
     assert post(viewer + "exposure", {"stops": 0})[0] == 200
 
 

@@ -52,7 +52,7 @@ void convert(const ambilux::BsdfRecord& from, BsdfRecord& to) {
 namespace {
 
 template <class From, class To>
-void convert_all(const std::vector<From>& from, std::vector<To>& to) {
+void convert_all(const From& from, std::vector<To>& to) {
     to.resize(from.size());
     for (size_t i = 0; i < from.size(); ++i) convert(from[i], to[i]);
 }

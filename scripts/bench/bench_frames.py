@@ -6,10 +6,10 @@
 Prints a table of frames per second by the median, milliseconds by the 95th percentile, and MiB at most.
 """
 
-import argparse
 import json
-import pathlib
 import subprocess
+
+from scenes_and_methods import name_of, parser_for
 
 METHODS = {
     "path": ["-i", "path"],
@@ -31,19 +31,10 @@ def frames(a, scene, method, memory):
     return f"{told['frames_per_second']:.1f}, {1000 * told['percentile_95_seconds']:.1f} ms, {told['memory_bytes_peak'] >> 20} MiB"
 
 
-def name_of(scene):
-    path = pathlib.Path(scene)
-    return path.parent.name if path.stem == "scene" else path.stem
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program")
-    parser.add_argument("scenes", nargs="+")
+    parser = parser_for(__doc__)
     parser.add_argument("--memory", nargs="+", default=["4G"])
     parser.add_argument("--frames", type=int, default=100)
-    parser.add_argument("--size", default="1920x1080")
-    parser.add_argument("--backend", default="cuda")
     a = parser.parse_args()
     print("| scene | memory | " + " | ".join(METHODS) + " |\n| --- | --- |" + " --- |" * len(METHODS))
     for scene in a.scenes:

@@ -31,7 +31,7 @@ Scene meshes() {
         add_mesh(scene, {c, c + random.in_box(1.0f), i % 11 ? far : c}, {0, 1, 2});
         scene.shapes.back().flags = i % 4;
         for (uint32_t k = 0; k < 3; ++k) {
-            MeshVertex& v = scene.vertices[scene.vertices.size() - 1 - k];
+            MeshVertex& v = scene.vertices.edit()[scene.vertices.size() - 1 - k];
             v.n = i % 13 ? random.direction() : Vec3f{0, 0, 0};
             v.u = i % 5 ? random.uniform() : 0.0f;
             v.v = random.uniform();

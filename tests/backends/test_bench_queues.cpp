@@ -132,5 +132,6 @@ TEST_CASE("bench queues refuses what it does not know") {
     CHECK(throws(ExitCode::usage, "at least 1 repetition", [&] { bench_queues(scene, "cpu", 0, 0); }));
     CHECK(throws(ExitCode::usage, "at most 268435456 items", [&] { bench_queues(scene, "cpu", (1u << 28) + 1, 1); }));
     if (!cuda_device_present())
-        CHECK(throws(ExitCode::device, "no CUDA device", [&] { bench_queues(scene, "cuda", 0, 1); }));
+        CHECK(throws(ExitCode::device, "--backend cuda: " + why_no_cuda_device(),
+                     [&] { bench_queues(scene, "cuda", 0, 1); }));
 }

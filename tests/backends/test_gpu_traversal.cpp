@@ -261,7 +261,7 @@ TEST_CASE("Device and host let the same rays pass surfaces of partial opacity (G
     for (Shape& shape : scene.shapes) shape.material = uint32_t(&shape - scene.shapes.data()) % 2;
     scene.shapes[0].primitive_count = soup / 2;
     scene.shapes.push_back({1, kNone, 0, soup / 2, soup - soup / 2, 0.0f});
-    for (uint32_t i = soup / 2; i < soup; ++i) scene.triangles[i].shape = uint32_t(scene.shapes.size() - 1);
+    for (uint32_t i = soup / 2; i < soup; ++i) scene.triangles.edit()[i].shape = uint32_t(scene.shapes.size() - 1);
     scene.features.opacity = scene.features.textures = true;
 
     const std::vector<Ray> rays = test_rays(scene, 400000, 1.0f, 36);

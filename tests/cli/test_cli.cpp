@@ -182,3 +182,17 @@ TEST_CASE("info tells what a scene has, and how long its parts took to load") {
     CHECK(seconds["build"].get<double>() > 0);
     CHECK(contains(run(folder, {"info", kCornell}).out, "kernels:"));
 }
+
+TEST_CASE("devices says which devices there are, or what is missing") {
+    const test::TempFolder folder;
+    const Outcome text = run(folder, {"devices"}), version = run(folder, {"--version"});
+    CHECK(text.code == 0);
+    CHECK(text.out.starts_with("CUDA"));
+    CHECK(version.out.ends_with(text.out));
+    const json j = json::parse(run(folder, {"devices", "--json", "-"}).out);
+    for (const char* name : {"toolkit", "kernels", "driver", "driver_cuda", "graphs", "problem", "devices"})
+        CHECK(j.contains(name));
+    // Either a device, or a reason; of each device kernels, or a reason.
+    CHECK(j["devices"].empty() == !j["problem"].get<std::string>().empty());
+    for (const auto& d : j["devices"]) CHECK((d["kernels"] == "none") <= !d["problem"].get<std::string>().empty());
+}

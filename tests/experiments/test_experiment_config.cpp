@@ -72,6 +72,18 @@ TEST_CASE("a sweep is one line and gives the product of its values, in the order
         CHECK(c.scenes[4].max_depth == -1);
         CHECK(c.scenes[4].base == "b");
     }
+    SECTION("of scenes it gives values of their parameters, by name and as $parameters") {
+        const ExperimentConfig c =
+            read(folder, changed("size = [9, 5]",
+                                 "size = [9, 5]\nparams = { \"red.reflectance\" = 0.5 }\nsweep = { "
+                                 "\"params.red.reflectance\" = [0.1, [0.1, 0.2, 0.3]], "
+                                 "\"parameters.res\" = [8, 16] }"));
+        REQUIRE(c.scenes.size() == 5);
+        CHECK(c.scenes[1].name == "b[params.red.reflectance=0.1,parameters.res=8]");
+        CHECK(c.scenes[3].name == "b[params.red.reflectance=0.1_0.2_0.3,parameters.res=8]");
+        CHECK(c.scenes[3].params == Settings{{"red.reflectance", "0.1 0.2 0.3"}});
+        CHECK(c.scenes[4].parameters == Settings{{"res", "16"}});
+    }
 }
 
 TEST_CASE("an ablation changes one switch of its default at a time") {
@@ -244,7 +256,7 @@ TEST_CASE("configurations are refused with file, line and the offending name, be
         return message;
     };
     CHECK(contains(refused("seeds = [1, 2]", "seed = [1, 2]"),
-                   "e.toml:2: unknown key 'seed' in the configuration; known are: name"));
+                   "e.toml:2: unknown key 'seed' in the configuration: is 'seeds' meant?"));
     CHECK(contains(refused("seeds = [1, 2]", "seeds = [1, 1]"), "e.toml:2: seed 1 is listed twice"));
     CHECK(contains(refused("seeds = [1, 2]", "seeds = 1"), "e.toml:2: 'seeds' must be a list"));
     CHECK(contains(refused("seeds = [1, 2]", "seeds = [1, 2"), "e.toml:3: "));

@@ -8,24 +8,12 @@
 
 #include "formats/images/image_write.h"
 #include "tests/support/mitsuba_text.h"
+#include "tests/support/scene_contents.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
 
 namespace {
-
-/// What a render depends on.
-std::string contents(const Scene& s) {
-    std::string bytes;
-    const auto add = [&](const auto& array) {
-        bytes.append(reinterpret_cast<const char*>(array.data()), array.size() * sizeof array[0]);
-    };
-    add(s.vertices), add(s.triangles), add(s.quadrics), add(s.shapes), add(s.materials), add(s.bsdfs), add(s.textures);
-    add(s.texels), add(s.emitters), add(s.tables);
-    bytes.append(reinterpret_cast<const char*>(&s.sensor), sizeof s.sensor);
-    const IntegratorHint& i = s.integrator;
-    return bytes + fmt::format("{} {} {} {} {}", i.type, i.max_depth, i.rr_depth, i.spp, i.hide_emitters);
-}
 
 /// A plugin with what it needs; %s stands for further parameters.
 struct Plugin {

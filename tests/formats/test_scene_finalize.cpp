@@ -88,7 +88,7 @@ void add_envmap(Scene& s, uint32_t w, uint32_t h, const std::vector<float>& grey
     s.texels.resize(s.texels.size() + grey.size() * 16);
     for (size_t i = 0; i < grey.size(); ++i) {
         const float c[4] = {grey[i], grey[i], grey[i], 1};
-        memcpy(s.texels.data() + t.offset + i * 16, c, 16);
+        memcpy(s.texels.edit() + t.offset + i * 16, c, 16);
     }
     Emitter e = emitter(EmitterType::envmap, {1, 1, 1});
     e.radiance.texture = int32_t(s.textures.size());

@@ -67,9 +67,9 @@ struct Writer {
     }
 };
 
-template <class T>
-std::string_view bytes_of(const std::vector<T>& v) {
-    return {reinterpret_cast<const char*>(v.data()), v.size() * sizeof(T)};
+template <class Array>
+std::string_view bytes_of(const Array& v) {
+    return {reinterpret_cast<const char*>(v.data()), v.size() * sizeof(*v.data())};
 }
 
 void check_same(const Scene& a, const Scene& b) {

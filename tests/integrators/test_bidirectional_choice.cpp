@@ -1,5 +1,5 @@
 // libs: ambilux_session ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
-// data: tagged
+// long: tagged
 // timeout: 900
 // seconds: 71
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
@@ -211,7 +211,7 @@ TEST_CASE("the error is predicted for the samples that the render will take") {
 
 TEST_CASE(
     "speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them",
-    "[data]") {
+    "[data][long]") {
     const std::optional<Scene> scene = published_scene("veach-mis", 160, 90);
     if (!scene) return;
     for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -229,7 +229,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("behind a door ajar draws learn, if the render is long enough for it and not on a device", "[data]") {
+TEST_CASE("behind a door ajar draws learn, if the render is long enough for it", "[data][long]") {
     const std::optional<Scene> scene = published_scene("veach-ajar", 160, 90);
     if (!scene) return;
     for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -246,7 +246,7 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
                              [](const SelectionCandidate& c) { return c.offer.least_subpaths > 0; });
     };
     CHECK(learning(false) == 3);
-    CHECK(learning(true) == 0);
+    CHECK(learning(true) == 3);
     s.technique_depth = 4;
     CHECK(learning(false) == 0);
     const Scene small = *published_scene("veach-ajar", 32, 18);
@@ -270,75 +270,6 @@ TEST_CASE("draws learn in renders of a quarter of a million eye subpaths or more
         }
         CHECK(learning == 3);
     }
-}
-
-TEST_CASE("the work of a candidate is that of its subpaths, shadow rays and connections, in rays") {
-    PilotWork w;
-    w.eye_rays = 3;
-    w.light_rays = 2;
-    w.next_events = 5;
-    w.splats = 7;
-    w.vertices = 4;
-    w.pairs = 100;
-    w.pair_rays = 11;
-    w.draws = 13;
-    w.draw_rays = 6;
-    const double eye = 3 + 0.8 * 5, light = 2 + 0.8 * 7;
-    for (const bool cuda : {false, true}) {
-        CAPTURE(cuda);
-        // docs/performance.md
-        const double pairs = (cuda ? 0.24 : 0.02) * 100 + (cuda ? 1.06 : 0.8) * 11,
-                     draw = (cuda ? 0.12 : 0.07) * 13 + (cuda ? 1.06 : 0.8) * 6, all = cuda ? 1.2 : 1;
-        const auto work = [&](const char* variant, float light_subpaths, const SelectionOffer& offer) {
-            SelectionCandidate c;
-            c.settings = {{"integrator", "bdpt"}, {"variant", variant}};
-            c.pilot = {light_subpaths, offer.connect, offer.worth};
-            c.offer = offer;
-            return selection_work(w, c, cuda);
-        };
-        CHECK(work("wavefront", 0, {}) == Approx(eye));
-        CHECK(work("wavefront", 0.25f, without_connections()) == Approx(all * (eye + 0.25 * light)));
-        const SelectionOffer paired = {"", {}, true};
-        CHECK(work("wavefront", 1, paired) == Approx(all * (eye + light + pairs)));
-        CHECK(work("lvc", 4, {"", {}, true, 2, 2}) == Approx(all * (eye + 4 * light + 2 * draw)));
-        CHECK(work("learned", 1, {"", {}, true, 4, 12, 1.5}) == Approx(all * 1.5 * (eye + light + 4 * draw)));
-        // A light subpath for every vertex of an eye subpath but the first.
-        CHECK(work("streaming", 1, paired) == Approx(all * (eye + light + pairs + 3 * 2)));
-        CHECK(work("streaming", 1, without_connections()) == Approx(all * (eye + light)));
-        w.vertices = 0.5;
-        CHECK(work("streaming", 1, paired) == Approx(all * (eye + light + pairs)));
-        w.vertices = 4;
-    }
-    // Four draws that learn take a quarter more than four that do not, and are worth twelve.
-    const std::vector<SelectionCandidate> all = selection_candidates(automatic_settings({}), false);
-    const auto named = [&](const std::string& name) {
-        return *std::find_if(all.begin(), all.end(), [&](const SelectionCandidate& c) { return c.name == name; });
-    };
-    const SelectionCandidate learned = named("bdpt, learned, 4 connections"), lvc = named("bdpt, lvc, 4 connections");
-    CHECK(selection_work(w, learned, false) == Approx(1.25 * selection_work(w, lvc, false)));
-    CHECK(learned.pilot.draws == 12);
-    CHECK(lvc.pilot.draws == 4);
-}
-
-TEST_CASE("a hundredth of the blocks, where the best of all candidates is worst, counts for none") {
-    Pilot pilot;
-    pilot.variance = {std::vector<double>(200, 2), std::vector<double>(200, 3)};
-    const auto set = [&](size_t block, double a, double b) {
-        pilot.variance[0][block] = a;
-        pilot.variance[1][block] = b;
-    };
-    set(7, 1000, 500);
-    set(8, 1000, 1);
-    set(9, 400, 600);
-    set(10, 300, 301);
-    const std::vector<double> kept = selection_variances(pilot);
-    REQUIRE(kept.size() == 2);
-    CHECK(kept[0] == Approx((196 * 2 + 1000 + 300) / 198.0));
-    CHECK(kept[1] == Approx((196 * 3 + 1 + 301) / 198.0));
-    for (std::vector<double>& of : pilot.variance) of.resize(99);
-    CHECK(selection_variances(pilot)[1] == Approx((95 * 3 + 500 + 1 + 600 + 301) / 99.0));
-    pilot.variance = {{0, 0}, {1, 0}};
-    CHECK(selection_variances(pilot) == std::vector<double>{1e-12, 0.5});
 }
 
 TEST_CASE("a candidate that cannot find some of the light is never chosen") {
@@ -397,77 +328,6 @@ TEST_CASE("a spot lamp behind a glass bead: no seed chooses a path tracer, and t
         z_test(render_batches(scene, cpu_settings(scene, Estimator::mis, 5), kSamples / 4), truth, options);
     INFO(z.report());
     CHECK_FALSE(z.pass);
-}
-
-TEST_CASE("what strategies cannot reach follows from emitters, BSDFs and depth") {
-    constexpr uint32_t kPath = kHitStrategies | kNextEventStrategies, kPlain = kPath | kLightStrategies;
-    const auto lost = [](Features f, uint32_t strategies, int max_depth = -1) {
-        return unreachable_path(f, strategies, kAllStrategies, max_depth);
-    };
-    // Every pair of an emitter and a BSDF beside diffuse surfaces.
-    EmitterModels::for_each([&](auto emitter) {
-        using E = typename decltype(emitter)::type;
-        BsdfModels::for_each([&](auto bsdf) {
-            using B = typename decltype(bsdf)::type;
-            const Features f = {
-                bit(BsdfType::diffuse) | bit(kBsdfType<B>), bit(kEmitterType<E>), 1, false, false, false};
-            if (is_beam(kEmitterType<E>)) {
-                // Light subpaths alone begin there.
-                CHECK(lost(f, kPath) == "Lb D E");
-                CHECK(lost(f, kPath, 1).empty());
-                CHECK(lost(f, kPlain) == (B::delta ? "Lb D D S E" : ""));
-                CHECK(lost(f, kLightStrategies) == (B::delta ? "Lb D D S E" : ""));
-                CHECK(lost(f, kConnectionStrategies) == "Lb D E");
-                CHECK(unreachable_path(f, kAllStrategies, -1) == (B::delta ? "Lb S E" : ""));
-                return;
-            }
-            const bool chain = is_delta(kEmitterType<E>) && B::delta;
-            INFO(name_of(kEmitterType<E>) << ", " << name_of(kBsdfType<B>));
-            CHECK(lost(f, kPath) == (chain ? "Ld S D E" : ""));
-            CHECK(lost(f, kPath, 2).empty());
-            CHECK(lost(f, kPlain) == (chain ? "Ld S D D S E" : ""));
-            CHECK(lost(f, kPlain, 4).empty());
-            CHECK(lost(f, kAllStrategies).empty());
-            CHECK(unreachable_path(f, kAllStrategies, -1) == (chain ? "Ld S E" : ""));
-            CHECK(unreachable_path(f, kAllStrategies, 1).empty());
-            CHECK(lost(f, kHitStrategies) == (is_delta(kEmitterType<E>) ? "Ld D E" : ""));
-            CHECK(lost(f, kLightStrategies) == (!is_delta(kEmitterType<E>) && B::delta ? "L S E"
-                                                : chain                                ? "Ld D S E"
-                                                                                       : ""));
-        });
-    });
-    // Mirrors alone: nothing can be connected, and nobody finds the lamp.
-    const Features mirrors = {bit(BsdfType::conductor), bit(EmitterType::point), 1, false, false, false};
-    CHECK(lost(mirrors, kPath).empty());
-    CHECK(unreachable_path(mirrors, kAllStrategies, -1) == "Ld S E");
-}
-
-TEST_CASE("what single strategies do not find is said") {
-    const auto lost = [](uint32_t bsdfs, uint32_t emitters, const char* strategies, int max_depth) {
-        Features f{};
-        f.bsdfs = bsdfs;
-        f.emitters = emitters;
-        RenderSettings s;
-        s.integrator = "bdpt";
-        s.max_depth = max_depth;
-        apply_setting(s, "strategies", strategies);
-        const std::string text = missing_light(f, s);
-        if (text.empty()) return text;
-        CHECK(text.find("these single strategies do not find") != std::string::npos);
-        const size_t begin = text.find("such as ") + 8;
-        return text.substr(begin, text.find(" (L: ") - begin);
-    };
-    const uint32_t diffuse = bit(BsdfType::diffuse), glass = bit(BsdfType::dielectric) | diffuse,
-                   area = 1u << uint32_t(EmitterType::area), point = 1u << uint32_t(EmitterType::point);
-    CHECK(lost(diffuse, area, "s1t2+s2t2", 3) == "L E");  // none for lamps that the camera sees
-    CHECK(lost(diffuse, area, "s0t2+s1t2", 3) == "L D D E");
-    CHECK(lost(diffuse, area, "s0t2+s1t2+s2t2", 3).empty());
-    CHECK(lost(diffuse, area, "s0t2+s1t2+s3t1", 3).empty());
-    CHECK(lost(glass, area, "s0t2+s1t2", 2) == "L S E");
-    CHECK(lost(glass, area, "s0t2+s0t3", 2).empty());
-    CHECK(lost(glass, area, "s0t2+s0t3+s2t2", 3) == "L S D E");
-    CHECK(lost(glass, point, "s1t2", 2).empty());  // by way of glass no strategy finds a point: no matter of these
-    CHECK(lost(glass, point, "s0t3", 2) == "Ld D E");
 }
 
 TEST_CASE("the selection repeats: it depends on the seed, and on clocks only where it says so") {

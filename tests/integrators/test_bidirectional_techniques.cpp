@@ -1,7 +1,8 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: statistical
 // timeout: 900
-// seconds: 69
+// seconds: 12
+// long: tagged
 // Strategies (s,t) one by one: their images beside a render, and as masks.
 #include <cmath>
 
@@ -137,7 +138,10 @@ TEST_CASE("A single strategy as a mask is its raw image", "[bidirectional]") {
     }
 }
 
-TEST_CASE("Each strategy alone, unweighted, agrees with the others of its length", "[bidirectional]") {
+namespace {
+
+/// Strategies of paths of `first` to `last` segments.
+void check_strategies(uint32_t first, uint32_t last) {
     // Smooth light of a large lamp and no corners: even connections (1/distance²) have little variance.
     const std::string open = kPlane +
                              "<shape type='rectangle'><transform name='to_world'><scale value='0.7'/><rotate x='1' "
@@ -153,7 +157,7 @@ TEST_CASE("Each strategy alone, unweighted, agrees with the others of its length
                lookat("origin='0.3,-1.2,0.5' target='0.1,-0.2,2.0' up='0,0,1'") + film(kSize) + "</sensor>" + open));
     ZTestOptions options;
     options.block = 4;
-    for (uint32_t k = 1; k <= 4; ++k) {
+    for (uint32_t k = first; k <= last; ++k) {
         const Scene& seen = k == 1 ? lit : scene;
         const uint32_t most = k == 1 ? 1536 : k == 2 ? 6144 : 57344;
         // Connections in the middle have the least noise.
@@ -166,6 +170,17 @@ TEST_CASE("Each strategy alone, unweighted, agrees with the others of its length
             check_agreement(render_until(seen, settings, most / 8, most, known, 0.02, options), known, 0.02, options);
         }
     }
+}
+
+}  // namespace
+
+TEST_CASE("Each strategy alone, unweighted, agrees with the others of its length", "[bidirectional]") {
+    check_strategies(1, 2);
+}
+
+TEST_CASE("Each strategy alone, unweighted, agrees with the others of its length: three and four segments",
+          "[bidirectional][long]") {
+    check_strategies(3, 4);
 }
 
 TEST_CASE("Single strategies: what is refused, and why", "[bidirectional]") {

@@ -1,6 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
-// data: tagged
+// long: tagged
 // Variant learned of bdpt: draws from a cache that follow what earlier samples have found.
 #include <cmath>
 #include <numeric>
@@ -408,7 +408,7 @@ TEST_CASE("what was learned is used after 1, 2, 4, 8 and 16 samples, and then af
     CHECK(g.updates(32, 500));
 }
 
-TEST_CASE("behind a door ajar learned draws have much less variance than uniform ones", "[data]") {
+TEST_CASE("behind a door ajar learned draws have much less variance than uniform ones", "[data][long]") {
     const auto scene = published_scene("veach-ajar", 64, 36);
     if (!scene) return;
     const double uniform = relative_variance(render_scene(*scene, settings_of(*scene, "lvc", 3), 128).film),

@@ -245,10 +245,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
         CHECK(message.find(allowed) != std::string::npos);
     }
     const std::string unknown = refused(s, "spp", "5");
-    for (const char* name :
-         {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel",
-          "draws", "wave_size", "compaction", "ordering", "specialise", "fuse", "cull", "tail", "deterministic"})
-        CHECK(unknown.find(name) != std::string::npos);
+    for (const char* part : {"'spp'", "`ambilux help settings`"}) CHECK(unknown.find(part) != std::string::npos);
 }
 
 TEST_CASE("Where items lie and in which order stages go through them changes no bit of the image and no count",

@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
+// seconds: 38
 // sampler=sobol: closed forms, the means of independent numbers, less variance, bits that depend on no thread and no
 // wave, and where it is refused. Errors come from seeds throughout: samples of a render depend on each other.
 #include <fmt/format.h>

@@ -31,7 +31,10 @@ RenderStats some_stats() {
     apply_setting(s.settings, "connections", "7");
     apply_setting(s.settings, "seed", "1099511627777");
     for (const Setting& own : variant_of(s.settings).own) s.settings.own[own.what.key] = own.text(s.settings);
+    s.device_seconds = 0.25;
     s.build_seconds = 1.5;
+    s.structure_seconds = 0.5;
+    s.kernel_seconds = 0.125;
     s.render_seconds = 20.25;
     s.samples = 64;
     s.wave_paths = 4096;
@@ -110,7 +113,10 @@ void check_same(const RenderStats& a, const RenderStats& b) {
         CHECK(s.text(a.settings) == s.text(b.settings));
     }
     CHECK(a.settings.own == b.settings.own);
+    CHECK(a.device_seconds == b.device_seconds);
     CHECK(a.build_seconds == b.build_seconds);
+    CHECK(a.structure_seconds == b.structure_seconds);
+    CHECK(a.kernel_seconds == b.kernel_seconds);
     CHECK(a.render_seconds == b.render_seconds);
     CHECK(a.samples == b.samples);
     CHECK(a.wave_paths == b.wave_paths);
@@ -221,6 +227,7 @@ TEST_CASE("a part adds its counts, times and rays to a total, the higher peak of
 TEST_CASE("devices that render together add up their memory, and the slowest build counts") {
     RenderStats a = some_stats(), b = some_stats();
     b.build_seconds = 0.5;
+    b.kernel_seconds = 0.25;
     b.memory_bytes = 2000;
     b.memory_bytes_predicted = 1900;
     b.memory_bytes_peak = 2100;
@@ -229,6 +236,7 @@ TEST_CASE("devices that render together add up their memory, and the slowest bui
     const RenderStats sum = sum_of_devices(earlier, {{"one", a}, {"one", b}}, false);
     CHECK(sum.device == "2 x H100");
     CHECK(sum.build_seconds == 1.5);
+    CHECK(sum.kernel_seconds == 0.25);
     CHECK(sum.memory_bytes == 3000);
     CHECK(sum.memory_bytes_predicted == 2800);
     CHECK(sum.memory_bytes_peak == 3200);
@@ -272,7 +280,12 @@ TEST_CASE("statistics as JSON hold what the render counted, under the names that
     CHECK(told["size"] == json({5, 3}));
     CHECK(told["spp"] == 64);
     CHECK(told["wave_paths"] == 4096);
-    CHECK(told["seconds"] == json({{"load", 0.75}, {"build", 1.5}, {"render", 20.25}}));
+    CHECK(told["seconds"] == json({{"load", 0.75},
+                                   {"device", 0.25},
+                                   {"build", 1.5},
+                                   {"structure", 0.5},
+                                   {"kernels", 0.125},
+                                   {"render", 20.25}}));
     CHECK(told["rays"] == json({{"extend", 3000}, {"occlude", 1050}}));
     CHECK(told["rays_per_second"] == 200.0);
     CHECK(told["stages"] == json::parse(R"([

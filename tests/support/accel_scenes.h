@@ -35,11 +35,12 @@ inline uint32_t add_diffuse(Scene& scene) {
 }
 
 inline void set_uvs(Scene& scene, const std::vector<Vec2f>& uvs) {
-    for (size_t i = 0; i < uvs.size(); ++i) scene.vertices[i].u = uvs[i].x, scene.vertices[i].v = uvs[i].y;
+    for (size_t i = 0; i < uvs.size(); ++i)
+        scene.vertices.edit()[i].u = uvs[i].x, scene.vertices.edit()[i].v = uvs[i].y;
 }
 
 inline void set_normals(Scene& scene, const std::vector<Vec3f>& normals) {
-    for (size_t i = 0; i < normals.size(); ++i) scene.vertices[i].n = normals[i];
+    for (size_t i = 0; i < normals.size(); ++i) scene.vertices.edit()[i].n = normals[i];
 }
 
 /// A new shape of triangles; positions and triples of indices into them. Call before any quadric is added.

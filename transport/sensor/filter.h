@@ -42,7 +42,7 @@ AMBILUX_HD float filter_table_pdf(const float32* table, float x) {
 
 /// Completes the table whose kFilterTableSize+1 offsets are the last of `tables`: appends the parts per pixel, and for
 /// each part the last entry below it, or the first of all.
-inline void append_filter_guide(std::vector<float32>& tables) {
+void append_filter_guide(auto& tables) {
     const size_t first = tables.size() - (kFilterTableSize + 1);
     tables.push_back(float32(kFilterTableSize) / (tables.back() - tables[first]));
     uint32_t entry = 0;
