@@ -1,7 +1,7 @@
 # What follows from integrators/registry.list and from the lists of methods outside of the tree (docs/extending.md).
 set(AMBILUX_LEVELS Diffuse Untextured Triangle Masked Common Flat All)
 # Levels that a line has to name. They are compiled wherever All is.
-set(AMBILUX_NAMED_LEVELS Tree Sobol)
+set(AMBILUX_NAMED_LEVELS Sampling)
 
 # read_registry(): sets `entries` to one "integrator|variant|folder|NAME|unit|level level ...|list:line" for each line of
 # all lists. `folder` is what generated sources include headers from, `outside` the folders with sources of their own.

@@ -8,6 +8,9 @@ namespace ambilux {
 /// Which subpath a number belongs to; light subpaths of the same index never share numbers with eye subpaths.
 enum class Stream : uint32_t { eye = 0, light = 1, bench = 2, test = 3, pilot = 4 };
 
+/// Bit of a stream whose numbers are points of a set, for ChosenPoints (core/sobol.h).
+constexpr uint32_t kOfPointSet = 8;
+
 /// Names a sequence of random blocks. `index`: pixel or light path; `sample`: sample of that pixel.
 struct RngKey {
     uint64_t seed;
@@ -52,7 +55,7 @@ AMBILUX_HD Vec4f uniform_floats(const Uint4& b) {
 /// Four uniform floats in [0,1) for `block` of the sequence.
 AMBILUX_HD Vec4f random_floats(const RngKey& key, uint32_t block) { return uniform_floats(random_bits(key, block)); }
 
-/// Where the numbers of a block come from. SobolPoints (core/sobol.h) has the same functions.
+/// Where the numbers of a block come from. SobolPoints and ChosenPoints (core/sobol.h) have the same functions.
 struct IndependentPoints {
     /// Number i of the n points that a sample has of one decision: they may take the blocks from `block` on.
     AMBILUX_HD static Uint4 bits(const RngKey& key, uint32_t block, uint32_t i = 0, uint32_t = 1) {

@@ -117,4 +117,20 @@ struct SobolPoints {
     AMBILUX_HD static Vec4f pick_and_place(Vec4f u) { return {u.z, u.x, u.y, u.w}; }
 };
 
+/// The key of the same sequence as points of a set.
+AMBILUX_HD RngKey of_point_set(RngKey key) {
+    key.stream = Stream(uint32_t(key.stream) | kOfPointSet);
+    return key;
+}
+
+/// Sobol' points where the key says so, independent ones elsewhere.
+struct ChosenPoints {
+    AMBILUX_HD static Uint4 bits(RngKey key, uint32_t block, uint32_t i = 0, uint32_t n = 1) {
+        if (!(uint32_t(key.stream) & kOfPointSet)) return IndependentPoints::bits(key, block, i, n);
+        key.stream = Stream(uint32_t(key.stream) & ~kOfPointSet);
+        return SobolPoints::bits(key, block, i, n);
+    }
+    AMBILUX_HD static Vec4f pick_and_place(Vec4f u) { return SobolPoints::pick_and_place(u); }
+};
+
 }  // namespace ambilux

@@ -48,17 +48,11 @@ constexpr Features kFlatFeatures = [] {
     return f;
 }();
 
-/// All, and lights picked by a tree. The level is compiled for the methods that name it (integrators/registry.list).
-constexpr Features kTreeFeatures = [] {
+/// All, and lights picked by a tree and numbers from Sobol' points where settings ask for them. The level is compiled
+/// for the methods that name it (integrators/registry.list).
+constexpr Features kSamplingFeatures = [] {
     Features f = kAllFeatures;
-    f.light_tree = true;
-    return f;
-}();
-
-/// All, and numbers from Sobol' points. The same holds for it.
-constexpr Features kSobolFeatures = [] {
-    Features f = kAllFeatures;
-    f.sobol = true;
+    f.sampling = true;
     return f;
 }();
 

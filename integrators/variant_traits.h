@@ -52,8 +52,8 @@ struct VariantTraits {
     bool repeats = true;           ///< on a device too, bits repeat with deterministic=true
     bool binary_bvh = false;       ///< has kernels for accel=bvh2
     bool streams = false;          ///< a wave holds more paths than it has slots
-    bool light_tree = false;       ///< has kernels that pick lights by a tree (level Tree)
-    bool sobol = false;            ///< has kernels whose numbers are Sobol' points (level Sobol)
+    bool light_tree = false;       ///< has kernels that pick lights by a tree (level Sampling)
+    bool sobol = false;            ///< has kernels whose numbers are Sobol' points (level Sampling)
     bool in_double = false;        ///< has a twin in double precision (render/twin/twin.h)
     bool selects_any = false;      ///< bdpt.auto=true selects any variant; else this one or the path tracer
     Merges merges = Merges::none;

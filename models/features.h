@@ -24,9 +24,8 @@ struct Features {
     bool instances = false;     ///< any group of triangles in several places (scene/view.h, Instance)
     bool latlong = false;       ///< a sensor of all directions (models/sensor_list.h)
     bool phong_facets = false;  ///< any BSDF with Microfacets::phong
-    bool light_tree = false;    ///< next event estimation picks lights by a tree (scene/light_tree.h): not of a scene,
-                                ///< but of kernels
-    bool sobol = false;         ///< numbers are Sobol' points (core/sobol.h): of kernels too
+    bool sampling = false;      ///< not of a scene, but of kernels: next event estimation may pick lights by a tree
+                                ///< (scene/light_tree.h), and numbers may be Sobol' points (core/sobol.h)
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -42,7 +41,7 @@ struct Features {
                (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
                (blends || !other.blends) && (coats || !other.coats) && (map_rules || !other.map_rules) &&
                (instances || !other.instances) && (latlong || !other.latlong) &&
-               (phong_facets || !other.phong_facets) && (light_tree || !other.light_tree) && (sobol || !other.sobol);
+               (phong_facets || !other.phong_facets) && (sampling || !other.sampling);
     }
     constexpr bool operator==(const Features&) const = default;
 };

@@ -57,7 +57,7 @@ public:
         faces_ = accels.get<Faces>();
         maker_.view.faces = faces_->data();
         accel_bytes_ += faces_->memory_bytes();
-        if constexpr (F.light_tree) {
+        if (maker_.picks_by_tree()) {
             light_tree_ = accels.get<LightTree>();
             maker_.view.light_tree = light_tree_->view();
             accel_bytes_ += light_tree_->memory_bytes();
@@ -316,7 +316,7 @@ private:
     tbb::task_arena arena_{int(threads())};
     std::shared_ptr<const void> accel_;
     std::shared_ptr<const Faces> faces_;
-    std::shared_ptr<const LightTree> light_tree_;  ///< Features::light_tree only
+    std::shared_ptr<const LightTree> light_tree_;  ///< light_picking=tree only
     std::vector<OwnWave> waves_;
     WaveState film_state_{};
     const volatile bool* give_up_ = nullptr;

@@ -41,7 +41,7 @@ public:
     /// The structure on the host, and what the pilot traces with.
     HostTracer find_structure(SharedAccels& accels) {
         const HostTracer tracer = find_tracer(accels);
-        if constexpr (F.light_tree) accel_bytes_ += light_tree_bytes(maker_.scene);
+        if (maker_.picks_by_tree()) accel_bytes_ += light_tree_bytes(maker_.scene);
         return tracer;
     }
     void upload(SharedAccels& accels) {
@@ -55,7 +55,7 @@ public:
             accel_ = accels.get<DeviceCwbvh>();
             maker_.tracer = accel_->tracer();
         }
-        if constexpr (F.light_tree) {
+        if (maker_.picks_by_tree()) {
             light_tree_ = accels.get<DeviceLightTree>();
             maker_.view.light_tree = light_tree_->view();
         }
@@ -363,7 +363,7 @@ private:
     std::string device_name_ = cuda_device_name();  ///< asked for once: statistics are read often
     std::optional<PairAccel> host_pairs_;           ///< until they are on the device
     std::shared_ptr<const DeviceScene> device_scene_;
-    std::shared_ptr<const DeviceLightTree> light_tree_;  ///< Features::light_tree only
+    std::shared_ptr<const DeviceLightTree> light_tree_;  ///< light_picking=tree only
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
     uint64_t accel_bytes_ = 0, held_ = 0, peak_ = 0;

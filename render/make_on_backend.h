@@ -42,12 +42,11 @@ std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make)
             else
                 return make.template operator()<kNoFusion>();
         }
-    if constexpr (F.light_tree)
+    if constexpr (F.sampling)
         if (settings.fuse == Fuse::none)
-            throw Error(ExitCode::usage, "fuse=none: there are no such kernels with light_picking=tree");
-    if constexpr (F.sobol)
-        if (settings.fuse == Fuse::none)
-            throw Error(ExitCode::usage, "fuse=none: there are no such kernels with sampler=sobol");
+            throw Error(ExitCode::usage, settings.sampler == Sampler::sobol
+                                             ? "fuse=none: there are no such kernels with sampler=sobol"
+                                             : "fuse=none: there are no such kernels with light_picking=tree");
     return make.template operator()<kFused>();
 }
 

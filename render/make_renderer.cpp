@@ -26,6 +26,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
     s.queues.keyed_hits =
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several_bsdfs;
     if (cuda && !cuda_graphs_choose()) s.graph = false;
+    if (!light_tree_pays(scene)) s.light_picking = LightPicks::table;
     if (s.draws == CacheDraws::automatic && variant.traits.draws_together)
         s.draws = cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;
@@ -34,8 +35,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
 /// The smallest level of features that covers the scene, of those that the backend is compiled for.
 CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderSettings& s) {
     Features needed = s.specialise && s.fuse != Fuse::none ? scene.features : kAllFeatures;
-    needed.light_tree = s.light_picking == LightPicks::tree && light_tree_pays(scene);
-    needed.sobol = s.sampler == Sampler::sobol;
+    needed.sampling = s.light_picking == LightPicks::tree || s.sampler == Sampler::sobol;
     const Variant& variant = variant_of(s);
     for (const CompiledRenderer& r : compiled_renderers()) {
         const CompiledRenderer::Make make = cuda ? r.cuda : r.cpu;
@@ -43,9 +43,7 @@ CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderS
             return make;
     }
     throw Error(ExitCode::usage, fmt::format("{}: integrators/registry.list has no level {} for it", variant.name(),
-                                             needed.sobol        ? "Sobol"
-                                             : needed.light_tree ? "Tree"
-                                                                 : "All"));
+                                             needed.sampling ? "Sampling" : "All"));
 }
 
 /// What a first start waits for, once for each variant. Only the kernels of this variant and level are loaded, and so
@@ -85,8 +83,6 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     accels.place_textures(settings.textures);
     if (in_double && settings.light_picking == LightPicks::tree)
         throw Error(ExitCode::usage, "light_picking=tree: precision=double picks emitters by the table alone");
-    if (settings.sampler == Sampler::sobol && settings.light_picking == LightPicks::tree)
-        throw Error(ExitCode::usage, "sampler=sobol: there are no kernels with light_picking=tree as well");
     if (in_double && settings.sampler == Sampler::sobol)
         throw Error(ExitCode::usage, "sampler=sobol: precision=double has independent numbers alone");
     if (in_double) return make_twin(scene, settings);

@@ -52,6 +52,9 @@ struct WaveMaker {
         return iterations * k;
     }
 
+    /// The renderer has a tree of lights.
+    bool picks_by_tree() const { return F.sampling && settings.light_picking == LightPicks::tree; }
+
     /// Samples lie in the memory of a wave until they are added to the film, or copied there.
     bool keeps_samples() const { return !kFilmWide || (threads == 0 && plan.in_parts()); }
 

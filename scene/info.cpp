@@ -33,8 +33,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.phong_facets) names.push_back("phong microfacets");
     if (f.instances) names.push_back("instances");
     if (f.latlong) names.push_back("spherical sensor");
-    if (f.light_tree) names.push_back("light tree");
-    if (f.sobol) names.push_back("Sobol' points");
+    if (f.sampling) names.push_back("sampling");
     return names;
 }
 

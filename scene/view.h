@@ -209,7 +209,7 @@ struct SceneView {
     const Instance* instances;  ///< first_id ascends
     uint32_t group_count, instance_count;
     uint32_t instanced_count;         ///< primitives of all instances
-    const LightTreeView* light_tree;  ///< Features::light_tree only (scene/light_tree.h)
+    const LightTreeView* light_tree;  ///< null: lights are picked by power (scene/light_tree.h)
 
     /// Primitive ids: 0..triangle_count-1 are triangles, then the quadrics, then those of instances.
     AMBILUX_HD uint32_t primitive_count() const { return triangle_count + quadric_count; }

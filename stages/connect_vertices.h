@@ -138,7 +138,7 @@ struct ConnectVertices {
         const ConnectionVertex<Mis> light = load_vertex<F>(source.vertices, place);
         const ConnectionVertex<Mis> eye = load_vertex<F>(vertices, pair.vertex);
         const SubpathEnd<Mis> z = unpack_end<F>(scene, eye);
-        const NumbersOf<Mis> numbers = {wave.key(pair.path)};
+        const NumbersOf<Mis> numbers = eye_numbers(rules.mis, wave, pair.path);
         const Warp warp;
         const auto search = source.search(numbers.key, z.depth, z.vertex, rules.max_depth, eye.front.link);
         pair.light = search.find(pair.next);

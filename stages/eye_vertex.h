@@ -92,7 +92,7 @@ struct EyeVertex {
         const EyeVertex& stage;
         uint32_t slot;
 
-        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return eye_numbers(stage.rules.mis, stage.wave, slot); }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, slot, c.ratio, c.strategy, {}});
@@ -134,7 +134,7 @@ struct ConnectEmitter {
         path.direction = item.d;
         path.throughput = end.throughput;
         path.depth = end.depth;
-        connect.at(scene, rules, end.vertex, path, item.path, {wave.key(item.path)});
+        connect.at(scene, rules, end.vertex, path, item.path, eye_numbers(rules.mis, wave, item.path));
     }
 };
 

@@ -1,8 +1,8 @@
 // generate: the first ray of each slot's subpath.
 #pragma once
 
-#include "stages/light_numbers.h"
 #include "stages/stage.h"
+#include "stages/subpath_numbers.h"
 #include "transport/subpath/start.h"
 
 namespace ambilux {
@@ -29,7 +29,7 @@ struct GenerateEye {
         const PathSlot p = wave.locate(slot);
         if (!p.active) return false;
         float tmax;
-        const Subpath<Mis> path = start_eye_subpath<F>(scene, mis, p.x, p.y, {wave.key(p)}, tmax);
+        const Subpath<Mis> path = start_eye_subpath<F>(scene, mis, p.x, p.y, eye_numbers(mis, wave, p), tmax);
         ray = Items::pack(path, Side::eye, slot, tmax);
         return true;
     }

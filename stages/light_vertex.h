@@ -1,8 +1,8 @@
 // light_shade and connect_camera: vertices of light subpaths.
 #pragma once
 
-#include "stages/light_numbers.h"
 #include "stages/stage.h"
+#include "stages/subpath_numbers.h"
 #include "transport/subpath/camera_connection.h"
 #include "transport/subpath/visit.h"
 

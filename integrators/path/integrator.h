@@ -33,7 +33,9 @@ struct PathIntegrator {
     };
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
         const PathPolicy p = plan_path(scene, settings);
-        return {p.rules.with(Mis{p.rules.mis}), p.waves, SamplingSettings::plan(settings)};
+        Mis mis = {p.rules.mis};
+        if constexpr (requires { mis.sobol; }) mis.sobol = settings.sampler == Sampler::sobol;
+        return {p.rules.with(mis), p.waves, SamplingSettings::plan(settings)};
     }
     static std::vector<std::string> skipped(const Scene& scene, const Policy& policy) {
         return skipped_path_parts(scene, policy.rules.with(UnidirectionalMis(policy.rules.mis)));

@@ -4,11 +4,11 @@ import argparse
 import pathlib
 
 
-def parser_for(description, methods=False):
-    """PROGRAM SCENE... --backend --size, and --methods where there are any."""
+def parser_for(description, methods=False, scenes=None):
+    """PROGRAM SCENE... --backend --size, and --methods where there are any. `scenes`: instead of none."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program")
-    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("scenes", nargs="*" if scenes else "+", default=scenes)
     parser.add_argument("--backend", default="cuda")
     parser.add_argument("--size", default="1920x1080")
     if methods:

@@ -33,7 +33,8 @@ RenderSettings tree_settings(const Scene& scene, const Method& m, uint64_t seed 
 }
 
 bool has_tree(const RenderStats& stats) {
-    return std::find(stats.features.begin(), stats.features.end(), "light tree") != stats.features.end();
+    return stats.settings.light_picking == LightPicks::tree &&
+           std::find(stats.features.begin(), stats.features.end(), "sampling") != stats.features.end();
 }
 
 /// A row of rooms with a lamp in each, seen from within one of them.

@@ -17,6 +17,7 @@ namespace {
 struct Method {
     const char *integrator, *variant;
     Estimator estimator = Estimator::mis;
+    LightPicks picks = LightPicks::table;
 };
 constexpr Method kPath = {"path", "wavefront"}, kLight = {"light", "wavefront"}, kPairs = {"bdpt", "wavefront"},
                  kCache = {"bdpt", "lvc"};
@@ -29,6 +30,7 @@ RenderSettings settings_of(const Scene& scene, const Method& m, Sampler sampler,
     s.integrator = m.integrator;
     s.variant = m.variant;
     s.sampler = sampler;
+    s.light_picking = m.picks;
     return s;
 }
 
@@ -123,7 +125,11 @@ TEST_CASE("By Sobol' points a plane under lamps has its closed form", "[path][bi
     });
     // Most light subpaths miss the plane.
     check_means(scene, kPath, 512, exact_estimate(expected), 1.5e-3);
-    for (const Method& m : {kPairs, kCache}) check_means(scene, m, 192, exact_estimate(expected), 5e-3);
+    // By a tree over the three as well.
+    for (Method m : {kPath, kPairs, kCache}) {
+        m.picks = LightPicks::tree;
+        check_means(scene, m, 192, exact_estimate(expected), 5e-3);
+    }
     check_means(scene, kLight, 512, exact_estimate(expected), 2e-2);
 }
 
@@ -218,7 +224,7 @@ TEST_CASE("Kernels know of Sobol' points where they are asked for alone") {
     const Scene scene = project_scene("cornell", 16, 16);
     const auto features = [&](Sampler sampler) {
         const std::vector<std::string> f = make_renderer(scene, settings_of(scene, kPath, sampler))->stats().features;
-        return std::count(f.begin(), f.end(), "Sobol' points");
+        return std::count(f.begin(), f.end(), "sampling");
     };
     CHECK(features(Sampler::sobol) == 1);
     CHECK(features(Sampler::independent) == 0);
@@ -240,7 +246,6 @@ TEST_CASE("sampler=sobol is refused by name where there is none") {
         refused(m, {}, "sampler=sobol: its kernels have independent numbers alone");
     refused(kPath, {{"precision", "double"}}, "sampler=sobol: precision=double");
     refused(kPath, {{"fuse", "none"}}, "fuse=none: there are no such kernels with sampler=sobol");
-    refused(kPath, {{"light_picking", "tree"}}, "sampler=sobol: there are no kernels with light_picking=tree");
     refused(kPairs, {{"bdpt.auto", "true"}}, "sampler=sobol: its pilot");
     CHECK_THROWS_WITH(check_replay(settings_of(scene, kPath, Sampler::sobol)), ContainsSubstring("sampler=sobol"));
     RenderSettings s;

@@ -73,8 +73,9 @@ private:
     AMBILUX_HD static float number(uint32_t w) { return float(int32_t(w & 1023u) - kMost) * (1.0f / float(kMost)); }
 };
 
-/// By the tree, and with a share of kPowerShare by power. `u` of a pick are the random numbers for the sample on the
-/// light: z has decided between the two, and w leads to the triangle that was picked.
+/// By the tree, and with a share of kPowerShare by power; where there is no tree, all by power. `u` of a pick are the
+/// random numbers for the sample on the light: z has decided between the two, and w leads to the triangle that was
+/// picked.
 struct LightsByTree {
     char nothing[0];  ///< no size, as BsdfDirections
 
@@ -84,6 +85,7 @@ struct LightsByTree {
         Vec4f u;
     };
     AMBILUX_HD static Pick pick(const SceneView& view, Receiver receiver, Vec4f u) {
+        if (!view.light_tree) return {LightsByPower::pick(view, receiver, u).emitter, 1.0f, u};
         const LightTreeView& tree = *view.light_tree;
         if (u.z < kPowerShare) {
             u.z *= 1.0f / kPowerShare;
@@ -120,6 +122,7 @@ struct LightsByTree {
         return at(tree, node & ~kLightLeaf, p, u);
     }
     AMBILUX_HD static float over_power(const SceneView& view, Receiver receiver, uint32_t emitter, uint32_t prim) {
+        if (!view.light_tree) return 1.0f;
         const LightTreeView& tree = *view.light_tree;
         uint32_t leaf = tree.first_leaf[emitter];
         if (leaf >= kLightBeside) return over_power_beside(tree, leaf);

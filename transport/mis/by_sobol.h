@@ -1,4 +1,4 @@
-// Weights where numbers are shuffled, Owen-scrambled Sobol' points (core/sobol.h). All else is that of `Base`.
+// Weights where numbers may be shuffled, Owen-scrambled Sobol' points (core/sobol.h). All else is that of `Base`.
 #pragma once
 
 #include "core/sobol.h"
@@ -6,17 +6,18 @@
 
 namespace ambilux {
 
-using SobolNumbers = NumbersFrom<SobolPoints>;
+using ChosenNumbers = NumbersFrom<ChosenPoints>;
 
 template <class Base>
 struct BySobol : Base {
-    using Numbers = SobolNumbers;
+    using Numbers = ChosenNumbers;
 
+    bool sobol = false;
     uint32_t light_subpaths_per_tile = 0;  ///< which number a light subpath has among those of its sample
 };
 
 /// The model of weights for kernels of features F.
 template <Features F, class Mis>
-using ModelFor = std::conditional_t<F.sobol, BySobol<PickingMis<F, Mis>>, PickingMis<F, Mis>>;
+using ModelFor = std::conditional_t<F.sampling, BySobol<ByTree<Mis>>, Mis>;
 
 }  // namespace ambilux

@@ -44,8 +44,4 @@ struct ByTree : Base {
     }
 };
 
-/// The model of weights for kernels of features F.
-template <Features F, class Mis>
-using PickingMis = std::conditional_t<F.light_tree, ByTree<Mis>, Mis>;
-
 }  // namespace ambilux

@@ -21,7 +21,7 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
     // Light subpaths begin by power, whatever next event estimation does; a mean needs no even points.
     constexpr Features kOwn = [] {
         Features f = F;
-        f.light_tree = f.sobol = false;
+        f.sampling = false;
         return f;
     }();
     return mean_light_vertices<kOwn>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);

@@ -45,8 +45,10 @@ template <class Mis>
 BdptPolicyOf<Mis> plan_bdpt(const Scene& scene, const RenderSettings& settings) {
     const BdptPolicy p = plan_bdpt(scene, settings);
     BdptPolicyOf<Mis> own = p.with(Mis{p.rules.mis});
-    if constexpr (requires { own.rules.mis.light_subpaths_per_tile; })
+    if constexpr (requires { own.rules.mis.sobol; }) {
+        own.rules.mis.sobol = settings.sampler == Sampler::sobol;
         own.rules.mis.light_subpaths_per_tile = p.waves.light_subpaths_per_tile;
+    }
     return own;
 }
 
