@@ -22,12 +22,13 @@ namespace {
 struct Trees {
     struct Policy {
         GuidedSettings guided;
+        GuideTraining training;
     } policy;
     HostMemory memory;
     GuidedState state;
     StageRecord record{};
 
-    explicit Trees(const GuidedSettings& settings) : policy{settings} {
+    explicit Trees(const GuidedSettings& settings) : policy{settings, {0, 4}} {
         Layout dry;
         const StateSize size = {0, host_primitive_bytes()};
         GuidedState::lay_out(dry, policy, size);
@@ -94,6 +95,7 @@ TEST_CASE("A learned density integrates to one, and is that of what is sampled")
         constexpr uint32_t kSide = 64, kSamples = 200'000;
         std::vector<double> observed(kSide * kSide), expected = observed;
         double whole = 0;
+        uint32_t differ = 0;
         // Squares of side 2^-level, as small as the cells that they lie in.
         const auto add = [&](auto&& self, uint32_t x, uint32_t y, uint32_t level) -> void {
             const float side = GuideQuads::side(level);
@@ -110,11 +112,14 @@ TEST_CASE("A learned density integrates to one, and is that of what is sampled")
         CHECK(whole == Approx(1).epsilon(1e-5));
         for (uint32_t i = 0; i < kSamples; ++i) {
             const Vec4f u = random_floats({2, i, 0, Stream::test}, 0);
-            const Vec3f d = tree.sample(0, {u.x, u.y});
+            float pdf_sa;
+            const Vec3f d = tree.sample(0, {u.x, u.y}, pdf_sa);
             const Vec2f at = square_of_direction(d);
-            CHECK(tree.pdf_sa(0, d) > 0);
+            CHECK(pdf_sa > 0);
+            differ += std::fabs(tree.pdf_sa(0, d) / pdf_sa - 1) > 1e-5f;
             observed[uint32_t(at.y * kSide) * kSide + uint32_t(at.x * kSide)] += 1;
         }
+        CHECK(differ < 20);  // rounded into another cell
         const test::ChiSquare test = test::chi_square(observed, expected);
         INFO("chi-square " << test.statistic << " of " << test.degrees);
         CHECK(test.p_value > 1e-4);
@@ -153,6 +158,21 @@ TEST_CASE("What brought no light leaves the trees as they were") {
     CHECK(pdf == Approx(4 * kInv4Pi * (1 + RefineQuads::kPrior) / (1 + 4 * RefineQuads::kPrior)));
     trees.learn([](uint32_t) {});
     CHECK(trees.state.tree.pdf_sa(0, {0, 0, 1}) == pdf);
+}
+
+TEST_CASE("What roulette goes by are means of what was recorded since the last update, and of all samples of a tile") {
+    Trees trees(GuidedSettings{});
+    trees.state.progress->unit[uint32_t(GuideSum::radiance)] = 0.5f;
+    for (const int64_t light : {3, 7}) {
+        trees.learn([&](uint32_t leaf) {
+            trees.put(leaf, {0, 0, 1}, 5);
+            trees.state.reflected[0] += 8, trees.state.reflected[1] += 8 * light;
+            trees.state.tiles[2] += 64, trees.state.tiles[3] += 64 * light;
+        });
+        CHECK(trees.state.tree.leaves[0].reflected == 0.5f * float(light));
+    }
+    CHECK(trees.state.over_pixel[0] == 0);  // nothing known
+    CHECK(trees.state.over_pixel[1] == Approx(1 / 2.5));
 }
 
 TEST_CASE("A leaf takes the share of the BSDF with which its records would have had the least second moment") {

@@ -14,10 +14,11 @@ TEST_CASE("Guided paths have the expectation of the path tracer", "[path]") {
         Scene scene = project_scene(name, 48, 32);
         scene.integrator.hide_emitters = true;
         const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 768).film);
-        for (const SettingTexts& own : std::vector<SettingTexts>{{}, {{"guide_target", "moment"}}}) {
+        for (const SettingTexts& own : std::vector<SettingTexts>{
+                 {}, {{"guide_target", "moment"}}, {{"guide_roulette", "false"}}}) {
             const Estimate image = render_until_seen(scene, guided(scene, 12, own), 512, path, 0.03);
             const ZTestResult z = z_test(image, path);
-            INFO(name << (own.empty() ? "" : ", moment") << ": " << z.report());
+            INFO(name << ", " << (own.empty() ? "" : own[0].first) << ": " << z.report());
             CHECK(z.pass);
             CHECK(sees_bias(image, path, 0.03));
         }

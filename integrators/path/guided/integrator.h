@@ -25,6 +25,7 @@ struct PathGuidedIntegrator {
         Policy p = {Path::plan(scene, settings), GuidedSettings::plan(settings), {}};
         p.waves.iteration_samples = p.guided.iteration_samples;
         const Sensor& s = scene.sensor;
+        p.training.tiles = ((s.crop_width + kTileSide - 1) / kTileSide) * ((s.crop_height + kTileSide - 1) / kTileSide);
         const uint64_t paths = uint64_t(s.crop_width) * s.crop_height * p.guided.iteration_samples;
         while (p.training.shift < kMostShift && paths >> p.training.shift > kTrainingPaths) ++p.training.shift;
         return p;
@@ -44,7 +45,8 @@ struct PathGuidedIntegrator {
 
     struct Stages {
         typename Path::Stages render, train;
-        GenerateTraining<GenerateEye<F, Mis>> generate_training;
+        GenerateGuided<GenerateEye<F, Mis>> generate;
+        GenerateTraining<GenerateGuided<GenerateEye<F, Mis>>> generate_training;
         RecordRays<Mis> record[2];
         LearnRecords learn;
         GuideStep update;
@@ -60,7 +62,8 @@ struct PathGuidedIntegrator {
             rekey(s.train, s.train.extend[0], s.train.extend[1], s.train.eye_vertex[0], s.train.eye_vertex[1],
                   s.train.connect_emitter, s.generate_training, s.learn);
             s.generate_training.round = round;
-            s.generate_training.share = kGuideRounds - 1 - round;
+            s.generate_training.share = s.learn.share = kGuideRounds - 1 - round;
+            s.learn.round = round;
             return s;
         }
 
@@ -72,7 +75,8 @@ struct PathGuidedIntegrator {
             return s;
         }
         static Policy guided_by(Policy p, const State& s) {
-            p.rules.directions.tree = s.tree;
+            p.rules.directions = {s.tree, p.guided.roulette};
+            p.rules.mis.tree = s.tree;
             return p;
         }
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& s, const Policy& p)
@@ -80,7 +84,9 @@ struct PathGuidedIntegrator {
             const auto note = [&](const char* name) { return parts.layout.record(name); };
             const Lane* const samples = parts.film.samples;
             name_training(note);
+            static_cast<GenerateEye<F, Mis>&>(generate) = render.generate;
             static_cast<GenerateEye<F, Mis>&>(generate_training) = train.generate;
+            generate.over_pixel = generate_training.over_pixel = s.over_pixel;
             generate_training.training = p.training;
             generate_training.progress = s.progress;
             for (int k = 0; k < 2; ++k)
@@ -107,7 +113,7 @@ struct PathGuidedIntegrator {
             });
             run.once([round](auto& exec, const Stages& s) { learn(exec, s, round); });
         }
-        run.for_waves([](auto& exec, const Stages& s) { paths(exec, s, s.render, s.render.generate); });
+        run.for_waves([](auto& exec, const Stages& s) { paths(exec, s, s.render, s.generate); });
         run.once([](auto& exec, const Stages& s) { learn(exec, s, kGuideRounds); });
     }
 

@@ -17,6 +17,7 @@ struct GuidedSettings {
     GuideTarget target = GuideTarget::radiance;
     float bsdf_share = 0.5f;         ///< of directions that the BSDF samples, at first
     bool learn_share = true;         ///< every leaf has a share of its own from the second update on
+    bool roulette = true;            ///< by what paths are expected to bring
     bool filter = true;              ///< what was learned is spread over the cells around it
     uint32_t split = 400;            ///< records that brought light to a leaf above which it splits, in the first round
     uint32_t most_leaves = 8192;     ///< of the tree over space

@@ -12,7 +12,12 @@ namespace ambilux {
 constexpr uint32_t kGuideRounds = 4;
 
 /// What is summed up in integers, in a unit of its own.
-enum class GuideSum : uint32_t { target, moment };
+enum class GuideSum : uint32_t {
+    target,
+    moment,
+    radiance,  ///< of pixels, and what scattered rays bring
+};
+constexpr uint32_t kGuideSums = 3;
 
 /// Shares of the BSDF that a leaf chooses from: the one with which the second moment of what its records brought would
 /// have been least. A guide that knows little is used little.
@@ -29,9 +34,8 @@ struct alignas(16) GuideProgress {
     uint32_t iterations;  ///< that are done, of this state
     uint32_t updates;     ///< of the trees
     uint32_t leaves;      ///< of the tree over space
-    float unit[2];        ///< of each GuideSum; 0: not known before light was found
-    uint32_t updating;    ///< the step at work makes new trees
-    uint32_t pad;
+    float unit[kGuideSums];  ///< of each GuideSum; 0: not known before light was found
+    uint32_t updating;       ///< the step at work makes new trees
 };
 
 struct GuidedState {
@@ -45,11 +49,14 @@ struct GuidedState {
     int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
     int64_t* records;    ///< [leaf]: of an update: how many brought something
     int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
+    int64_t* reflected;  ///< [leaf][count, sum] of what scattered rays brought
+    int64_t* tiles;      ///< [tile][count, sum]: samples of its pixels
+    float* over_pixel;   ///< [tile]: 1 over the mean of its pixels; 0: not known
     int64_t* exponents;  ///< [sum]: how many values had this exponent, while there is no unit
     uint32_t* splits;    ///< [leaf]: leaves that it gets beside
     uint32_t* places;    ///< sums of splits
     ScanMemory scan;
-    uint32_t most_leaves;
+    uint32_t most_leaves, tile_count;
 
     template <class Policy>
     static GuidedState lay_out(Layout& layout, const Policy& p, const StateSize& size) {
@@ -64,7 +71,11 @@ struct GuidedState {
         s.found = layout.allocate<int64_t>(4ull * nodes);
         s.records = layout.allocate<int64_t>(n);
         s.shares = layout.allocate<int64_t>(n * GuideShares::kCount);
-        s.exponents = layout.allocate<int64_t>(2 * kExponents);
+        s.reflected = layout.allocate<int64_t>(2 * n);
+        s.tile_count = p.training.tiles;
+        s.tiles = layout.allocate<int64_t>(2 * s.tile_count);
+        s.over_pixel = layout.allocate<float>(s.tile_count);
+        s.exponents = layout.allocate<int64_t>(kGuideSums * kExponents);
         s.splits = layout.allocate<uint32_t>(n);
         s.places = layout.allocate<uint32_t>(n);
         s.scan = ScanMemory::lay_out(layout, n, size.primitives);
@@ -74,8 +85,8 @@ struct GuidedState {
     template <class Policy, class Put>
     void init(const Policy&, Put put) const {
         put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
-        put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1.0f, 1}});
-        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0, 0}});
+        put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1, 1.0f, 0.0f}});
+        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0}});
     }
     template <class Visit>
     void for_each_saved(Visit visit) const {
@@ -88,7 +99,10 @@ struct GuidedState {
         visit("guide_sums", sums, 4 * nodes);
         visit("guide_found", found, 4 * nodes);
         visit("guide_shares", shares, n * GuideShares::kCount);
-        visit("guide_exponents", exponents, uint64_t(2 * kExponents));
+        visit("guide_reflected", reflected, 2 * n);
+        visit("guide_tiles", tiles, uint64_t(2 * tile_count));
+        visit("guide_over_pixel", over_pixel, uint64_t(tile_count));
+        visit("guide_exponents", exponents, uint64_t(kGuideSums * kExponents));
     }
 };
 

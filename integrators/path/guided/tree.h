@@ -7,11 +7,24 @@
 
 namespace ambilux {
 
+/// Angle of (x, y) over 2 pi, in [0, 1]; 0 of (0, 0). Right to 2e-7: a polynomial of the lesser over the greater.
+AMBILUX_HD float turn_of(float x, float y) {
+    const float ax = fabsf(x), ay = fabsf(y), most = max(ax, ay);
+    if (!(most > 0.0f)) return 0.0f;
+    const float t = min(ax, ay) / most, s = t * t;
+    float p = 0.00108401687f;
+    for (const float c :
+         {-0.0053479122f, 0.0126720499f, -0.0210612528f, 0.0315250419f, -0.0530262291f, 0.159154326f})
+        p = p * s + c;
+    p *= t;
+    if (ay > ax) p = 0.25f - p;
+    if (x < 0.0f) p = 0.5f - p;
+    return y < 0.0f ? 1.0f - p : p;
+}
+
 /// Unit directions as points of the unit square, inverse of square_to_sphere: areas are solid angles over 4 pi.
 AMBILUX_HD Vec2f square_of_direction(Vec3f d) {
-    const float turn = atan2f(d.y, d.x) * kInv2Pi;
-    return {clamp(0.5f - 0.5f * d.z, 0.0f, kOneMinusEpsilon),
-            clamp(turn < 0.0f ? turn + 1.0f : turn, 0.0f, kOneMinusEpsilon)};
+    return {clamp(0.5f - 0.5f * d.z, 0.0f, kOneMinusEpsilon), clamp(turn_of(d.x, d.y), 0.0f, kOneMinusEpsilon)};
 }
 
 /// Which of two parts `u` in [0,1) falls to, the first with probability `first`; `u` is uniform again after it.
@@ -37,7 +50,7 @@ struct GuideQuads {
         float density;  ///< per area of the square
     };
 
-    AMBILUX_HD static float side(uint32_t level) { return ldexpf(1.0f, -int(level)); }
+    AMBILUX_HD static float side(uint32_t level) { return bits_float(FloatBits(kExponentBias - level) << kFractionBits); }
     AMBILUX_HD static uint32_t child(uint32_t children, uint32_t quadrant) { return children >> 8 * quadrant & 0xffu; }
     AMBILUX_HD Vec4f probabilities(uint32_t at) const { return start_of<Vec4f>(masses[at]); }
     AMBILUX_HD static float of(Vec4f m, uint32_t quadrant) {
@@ -56,10 +69,11 @@ struct GuideQuads {
             if (node == 0) return c;
         }
     }
-    /// A point of the square, in proportion to the density.
-    AMBILUX_HD Vec2f sample(uint32_t leaf, Vec2f u) const {
+    /// A point of the square, in proportion to the density, which is that of its cell.
+    AMBILUX_HD Vec2f sample(uint32_t leaf, Vec2f u, float& density) const {
         Vec2f low = {0.0f, 0.0f};
         float side = 1.0f;
+        density = 1.0f;
         for (uint32_t node = 0;;) {
             const uint32_t at = leaf * kNodes + node;
             const Vec4f m = probabilities(at);
@@ -67,6 +81,7 @@ struct GuideQuads {
             const uint32_t x = pick_half(left / (left + right), u.x);
             const uint32_t y = pick_half((x ? m.y : m.x) / (x ? right : left), u.y);
             side *= 0.5f;
+            density *= 4.0f * of(m, x + 2 * y);
             low = {low.x + float(x) * side, low.y + float(y) * side};
             node = child(children[at], x + 2 * y);
             if (node == 0) return {low.x + side * u.x, low.y + side * u.y};
@@ -77,9 +92,10 @@ struct GuideQuads {
 /// A leaf of the tree over space.
 struct alignas(16) GuideLeaf {
     uint32_t node;     ///< of the tree over space that it is
-    uint32_t depth;    ///< of that node
+    uint16_t depth;    ///< of that node
+    uint16_t quads;    ///< nodes of its quadtree
     float bsdf_share;  ///< of directions that the BSDF samples; 1: nothing was learned here
-    uint32_t quads;    ///< nodes of its quadtree
+    float reflected;   ///< mean radiance that rays scattered here bring; 0: not known
 };
 
 /// What is sampled from. Nodes of the tree over space halve their cells along x, y, z and so on.
@@ -121,7 +137,11 @@ struct GuideTree {
     AMBILUX_HD float pdf_sa(uint32_t leaf, Vec3f d) const {
         return kInv4Pi * quads.cell(leaf, square_of_direction(d)).density;
     }
-    AMBILUX_HD Vec3f sample(uint32_t leaf, Vec2f u) const { return square_to_sphere(quads.sample(leaf, u)); }
+    AMBILUX_HD Vec3f sample(uint32_t leaf, Vec2f u, float& pdf_sa) const {
+        const Vec2f at = quads.sample(leaf, u, pdf_sa);
+        pdf_sa *= kInv4Pi;
+        return square_to_sphere(at);
+    }
 };
 
 }  // namespace ambilux

@@ -17,6 +17,10 @@ struct GuideStep {
 
     AMBILUX_HD const GuideTree& tree() const { return state.tree; }
     AMBILUX_HD GuideProgress& progress() const { return *state.progress; }
+    /// Of a count and a sum that is not 0.
+    AMBILUX_HD float mean_radiance(const int64_t* sum) const {
+        return float(sum[1]) / float(sum[0]) * progress().unit[uint32_t(GuideSum::radiance)];
+    }
     /// Samples of one tree are twice those of the one before: 1, 2, 4, ... iterations.
     AMBILUX_HD bool is_due() const {
         if (round < kGuideRounds) return progress().rounds == round;
@@ -32,7 +36,7 @@ struct BeginUpdate : GuideStep {
         GuideProgress& p = progress();
         p.updating = is_due() && p.unit[0] > 0.0f;
         if (!is_due()) return;
-        for (uint32_t k = 0; k < 2; ++k)
+        for (uint32_t k = 0; k < kGuideSums; ++k)
             if (p.unit[k] == 0.0f) p.unit[k] = unit_of(state.exponents + k * GuidedState::kExponents);
     }
 
@@ -64,9 +68,12 @@ struct RefineQuads : GuideStep {
         state.records[leaf] = found;
         if (!(total > 0.0f)) return;
         const uint32_t nodes = rebuild(first, total, float(found));
-        for (uint64_t k = 4ull * first; k < 4ull * (first + max(nodes, of.quads)); ++k)
+        for (uint64_t k = 4ull * first; k < 4ull * (first + max(nodes, uint32_t(of.quads))); ++k)
             state.sums[k] = state.found[k] = 0;
-        of.quads = nodes;
+        of.quads = uint16_t(nodes);
+        int64_t* reflected = state.reflected + 2 * leaf;
+        if (reflected[1] > 0) of.reflected = mean_radiance(reflected);
+        reflected[0] = reflected[1] = 0;
         of.bsdf_share = best_share(state.shares + leaf * GuideShares::kCount, of.bsdf_share);
     }
 
@@ -185,7 +192,9 @@ struct SplitLeaves : GuideStep {
         for (uint32_t k = 0; k <= more; ++k) {
             const uint32_t node = place(more + 1 + k), id = k == 0 ? leaf : first + k - 1;
             tree().space[node] = GuideTree::kLeafBit | id;
-            tree().leaves[id] = {node, whole.depth + log2_of(more + 1), whole.bsdf_share, whole.quads};
+            tree().leaves[id] = whole;
+            tree().leaves[id].node = node;
+            tree().leaves[id].depth = uint16_t(whole.depth + log2_of(more + 1));
             if (k > 0) copy_quads(leaf, id, whole.quads);
         }
     }
@@ -202,6 +211,14 @@ private:
             q.masses[to * GuideQuads::kNodes + n] = q.masses[from * GuideQuads::kNodes + n];
             q.children[to * GuideQuads::kNodes + n] = q.children[from * GuideQuads::kNodes + n];
         }
+    }
+};
+
+/// What pixels of a tile are expected to be.
+struct UpdateTiles : GuideStep {
+    AMBILUX_HD void operator()(uint32_t tile) const {
+        const int64_t* sums = state.tiles + 2 * tile;
+        if (progress().updating && sums[1] > 0) state.over_pixel[tile] = 1.0f / mean_radiance(sums);
     }
 };
 
@@ -242,9 +259,10 @@ struct GuideUpdate {
     RefineQuads refine;
     CountSplits count;
     SplitLeaves split;
+    UpdateTiles tiles;
     EndUpdate end;
 
-    static GuideUpdate of(const GuideStep& step) { return {{step}, {step}, {step}, {step}, {step}}; }
+    static GuideUpdate of(const GuideStep& step) { return {{step}, {step}, {step}, {step}, {step}, {step}}; }
     template <class Executor>
     void run(Executor& exec) const {
         const GuidedState& s = begin.state;
@@ -253,6 +271,7 @@ struct GuideUpdate {
         exec.for_each(count, s.most_leaves);
         exec.scan(s.scan, s.splits, s.places, s.most_leaves, begin.record);
         exec.for_each(split, s.most_leaves);
+        exec.for_each(tiles, s.tile_count);
         exec.for_each(end, 1);
     }
 };
