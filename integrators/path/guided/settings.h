@@ -19,7 +19,7 @@ struct GuidedSettings {
     bool learn_share = true;         ///< every leaf has a share of its own from the second update on
     bool roulette = true;            ///< by what paths are expected to bring
     bool filter = true;              ///< what was learned is spread over the cells around it
-    uint32_t split = 400;            ///< records that brought light to a leaf above which it splits, in the first round
+    uint32_t split = 100;            ///< records that brought light to a leaf above which it splits, in the first round
     uint32_t most_leaves = 8192;     ///< of the tree over space
     uint32_t iteration_samples = 4;  ///< samples of every pixel in one iteration
 
