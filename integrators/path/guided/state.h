@@ -1,0 +1,109 @@
+// What variant guided keeps from iteration to iteration: the trees, and what was recorded since they were made.
+#pragma once
+
+#include "integrators/kept_state.h"
+#include "integrators/path/guided/settings.h"
+#include "integrators/path/guided/tree.h"
+
+namespace ambilux {
+
+/// Rounds of training before the first iteration. Their samples are not part of the image; each has twice as many paths
+/// as the one before, the last all.
+constexpr uint32_t kGuideRounds = 4;
+
+/// What is summed up in integers, in a unit of its own.
+enum class GuideSum : uint32_t {
+    target,
+    moment,
+    radiance,  ///< of pixels, and what scattered rays bring
+};
+constexpr uint32_t kGuideSums = 3;
+
+/// Shares of the BSDF that a leaf chooses from: the one with which the second moment of what its records brought would
+/// have been least. A guide that knows little is used little.
+struct GuideShares {
+    static constexpr uint32_t kCount = 8;
+    static constexpr float kMost = 0x1p28f;  ///< units that one record counts, at most
+
+    AMBILUX_HD static float of(uint32_t k) { return (float(k) + 0.5f) / float(kCount); }
+};
+
+/// How far learning has come.
+struct alignas(16) GuideProgress {
+    uint32_t rounds;      ///< of training that are done
+    uint32_t iterations;  ///< that are done, of this state
+    uint32_t updates;     ///< of the trees
+    uint32_t leaves;      ///< of the tree over space
+    float unit[kGuideSums];  ///< of each GuideSum; 0: not known before light was found
+    uint32_t updating;       ///< the step at work makes new trees
+};
+
+struct GuidedState {
+    static constexpr StateKind kKind = StateKind::per_device;
+    static constexpr uint32_t kExponents = 256;
+
+    GuideTree tree;
+    GuideQuads old;  ///< of an update: quadtrees as they were, with masses
+    GuideProgress* progress;
+    int64_t* sums;   ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
+    int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
+    int64_t* records;    ///< [leaf]: of an update: how many brought something
+    int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
+    int64_t* reflected;  ///< [leaf][count, sum] of what scattered rays brought
+    int64_t* tiles;      ///< [tile][count, sum]: samples of its pixels
+    float* over_pixel;   ///< [tile]: 1 over the mean of its pixels; 0: not known
+    int64_t* exponents;  ///< [sum]: how many values had this exponent, while there is no unit
+    uint32_t* splits;    ///< [leaf]: leaves that it gets beside
+    uint32_t* places;    ///< sums of splits
+    ScanMemory scan;
+    uint32_t most_leaves, tile_count;
+
+    template <class Policy>
+    static GuidedState lay_out(Layout& layout, const Policy& p, const StateSize& size) {
+        const uint32_t n = p.guided.most_leaves, nodes = n * GuideQuads::kNodes;
+        GuidedState s{};
+        s.tree.space = layout.allocate<uint32_t>(2 * n);
+        s.tree.leaves = layout.allocate<GuideLeaf>(n);
+        s.tree.quads = {layout.allocate<Lane>(nodes), layout.allocate<uint32_t>(nodes)};
+        s.old = {layout.allocate<Lane>(nodes), layout.allocate<uint32_t>(nodes)};
+        s.progress = layout.allocate<GuideProgress>(1);
+        s.sums = layout.allocate<int64_t>(4ull * nodes);
+        s.found = layout.allocate<int64_t>(4ull * nodes);
+        s.records = layout.allocate<int64_t>(n);
+        s.shares = layout.allocate<int64_t>(n * GuideShares::kCount);
+        s.reflected = layout.allocate<int64_t>(2 * n);
+        s.tile_count = p.training.tiles;
+        s.tiles = layout.allocate<int64_t>(2 * s.tile_count);
+        s.over_pixel = layout.allocate<float>(s.tile_count);
+        s.exponents = layout.allocate<int64_t>(kGuideSums * kExponents);
+        s.splits = layout.allocate<uint32_t>(n);
+        s.places = layout.allocate<uint32_t>(n);
+        s.scan = ScanMemory::lay_out(layout, n, size.primitives);
+        s.most_leaves = n;
+        return s;
+    }
+    template <class Policy, class Put>
+    void init(const Policy&, Put put) const {
+        put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
+        put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1, 1.0f, 0.0f}});
+        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0}});
+    }
+    template <class Visit>
+    void for_each_saved(Visit visit) const {
+        const uint64_t n = most_leaves, nodes = n * GuideQuads::kNodes;
+        visit("guide_progress", progress, 1);
+        visit("guide_space", tree.space, 2 * n);
+        visit("guide_leaves", tree.leaves, n);
+        visit("guide_masses", tree.quads.masses, nodes);
+        visit("guide_children", tree.quads.children, nodes);
+        visit("guide_sums", sums, 4 * nodes);
+        visit("guide_found", found, 4 * nodes);
+        visit("guide_shares", shares, n * GuideShares::kCount);
+        visit("guide_reflected", reflected, 2 * n);
+        visit("guide_tiles", tiles, uint64_t(2 * tile_count));
+        visit("guide_over_pixel", over_pixel, uint64_t(tile_count));
+        visit("guide_exponents", exponents, uint64_t(kGuideSums * kExponents));
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,257 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 300
+// Path guiding: densities are those of what is sampled; the trees follow from what was recorded, not from threads,
+// waves or where a render was stopped.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "backends/cpu/host_memory.h"
+#include "backends/cpu/whole_executor.h"
+#include "integrators/offers.h"
+#include "integrators/path/guided/update.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/guided_settings.h"
+#include "tests/support/whole_iterations.h"
+
+using namespace ambilux;
+
+namespace {
+
+/// Trees in memory of their own, and the steps that make them.
+struct Trees {
+    struct Policy {
+        GuidedSettings guided;
+        GuideTraining training;
+    } policy;
+    HostMemory memory;
+    GuidedState state;
+    StageRecord record{};
+
+    explicit Trees(const GuidedSettings& settings) : policy{settings, {0, 4}} {
+        Layout dry;
+        const StateSize size = {0, host_primitive_bytes()};
+        GuidedState::lay_out(dry, policy, size);
+        memory = HostMemory(dry.bytes());
+        Layout placed(dry, memory.data());
+        state = GuidedState::lay_out(placed, policy, size);
+        state.init(policy, [](auto* to, const auto& from) { std::copy(from.begin(), from.end(), to); });
+        state.tree.inverse_side = 1.0f;
+        state.progress->unit[0] = 1.0f;
+    }
+    /// The next step of learning, after `add(leaf)` has recorded what there is in a leaf.
+    template <class Add>
+    void learn(Add add) {
+        for (uint32_t leaf = 0; leaf < state.progress->leaves; ++leaf) add(leaf);
+        GuideStep step = {state, policy.guided, &record, state.progress->rounds};
+        CpuWholeExecutor exec;
+        GuideUpdate::of(step).run(exec);
+    }
+    /// `units` in the cell where direction `d` lies.
+    void put(uint32_t leaf, Vec3f d, int64_t units) const {
+        const GuideQuads::Cell c = state.tree.quads.cell(leaf, square_of_direction(d));
+        const size_t place = (leaf * GuideQuads::kNodes + c.node) * 4 + c.quadrant;
+        state.sums[place] += units;
+        ++state.found[place];
+    }
+    /// Light from one side, some of it from a spot.
+    void put_light(uint32_t leaf, uint32_t records) const {
+        for (uint32_t i = 0; i < records; ++i) {
+            const Vec4f u = random_floats({1, i, leaf, Stream::test}, 0);
+            const bool spot = u.w < 0.5f;
+            Vec3f d = spot ? square_to_cone({u.x, u.y}, 1e-3f) : square_to_sphere({u.x, u.y});
+            if (spot || d.x > 0.2f) put(leaf, d, 1000);
+        }
+    }
+    uint32_t leaves() const { return state.progress->leaves; }
+};
+
+}  // namespace
+
+TEST_CASE("Directions of the unit square are those of the sphere") {
+    for (uint32_t i = 0; i < 10000; ++i) {
+        const Vec4f u = random_floats({1, i, 0, Stream::test}, 0);
+        const Vec2f at = square_of_direction(square_to_sphere({u.x, u.y}));
+        CHECK(std::fabs(at.x - u.x) < 1e-6f);
+        CHECK(std::min(std::fabs(at.y - u.y), 1 - std::fabs(at.y - u.y)) * std::sqrt(u.x * (1 - u.x)) < 1e-6f);
+    }
+    for (const Vec3f d : {Vec3f{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {1, -0.0f, 0}, {-1, 0, 0}, {0, -1, 0}}) {
+        const Vec2f at = square_of_direction(d);
+        CHECK((at.x >= 0 && at.x < 1 && at.y >= 0 && at.y < 1));
+    }
+}
+
+TEST_CASE("A learned density integrates to one, and is that of what is sampled") {
+    for (const GuideTarget target : {GuideTarget::radiance, GuideTarget::moment}) {
+        GuidedSettings settings;
+        settings.target = target;
+        settings.split = 1u << 20;
+        Trees trees(settings);
+        for (int round = 0; round < 4; ++round) trees.learn([&](uint32_t leaf) { trees.put_light(leaf, 20000); });
+        const GuideTree& tree = trees.state.tree;
+        CHECK(trees.leaves() == 1);
+        CHECK(tree.leaves[0].quads > 20);
+        CHECK(tree.leaves[0].quads <= GuideQuads::kNodes);
+        constexpr uint32_t kSide = 64, kSamples = 200'000;
+        std::vector<double> observed(kSide * kSide), expected = observed;
+        double whole = 0;
+        uint32_t differ = 0;
+        // Squares of side 2^-level, as small as the cells that they lie in.
+        const auto add = [&](auto&& self, uint32_t x, uint32_t y, uint32_t level) -> void {
+            const float side = GuideQuads::side(level);
+            const GuideQuads::Cell cell = tree.quads.cell(0, {(float(x) + 0.5f) * side, (float(y) + 0.5f) * side});
+            if (cell.level > level || level < 6) {
+                for (uint32_t q = 0; q < 4; ++q) self(self, 2 * x + (q & 1), 2 * y + q / 2, level + 1);
+                return;
+            }
+            const double mass = double(cell.density) * double(side) * double(side);
+            whole += mass;
+            expected[(y >> (level - 6)) * kSide + (x >> (level - 6))] += mass * kSamples;
+        };
+        add(add, 0, 0, 0);
+        CHECK(whole == Approx(1).epsilon(1e-5));
+        for (uint32_t i = 0; i < kSamples; ++i) {
+            const Vec4f u = random_floats({2, i, 0, Stream::test}, 0);
+            float pdf_sa;
+            const Vec3f d = tree.sample(0, {u.x, u.y}, pdf_sa);
+            const Vec2f at = square_of_direction(d);
+            CHECK(pdf_sa > 0);
+            differ += std::fabs(tree.pdf_sa(0, d) / pdf_sa - 1) > 1e-5f;
+            observed[uint32_t(at.y * kSide) * kSide + uint32_t(at.x * kSide)] += 1;
+        }
+        CHECK(differ < 20);  // rounded into another cell
+        const test::ChiSquare test = test::chi_square(observed, expected);
+        INFO("chi-square " << test.statistic << " of " << test.degrees);
+        CHECK(test.p_value > 1e-4);
+    }
+}
+
+TEST_CASE("Leaves split where many records are, as far as there is room, and their halves have the same quadtree") {
+    for (const uint32_t most : {1u, 5u, 128u, 1000u}) {
+        GuidedSettings settings;
+        settings.split = 100;
+        settings.most_leaves = most;
+        Trees trees(settings);
+        trees.learn([&](uint32_t leaf) { trees.put_light(leaf, 10000); });
+        const GuideTree& tree = trees.state.tree;
+        CHECK(trees.leaves() == (most < 128 ? 1u : 128u));  // about 7000 records
+        for (uint32_t leaf = 0; leaf < trees.leaves(); ++leaf) {
+            CHECK(tree.space[tree.leaves[leaf].node] == (GuideTree::kLeafBit | leaf));
+            CHECK(tree.leaves[leaf].depth == (most < 128 ? 0u : 7u));
+            for (const Vec3f d : {Vec3f{1, 0, 0}, {0, 0, 1}, {-1, 0, 0}})
+                CHECK(tree.pdf_sa(leaf, d) == tree.pdf_sa(0, d));
+        }
+        std::vector<uint32_t> found(trees.leaves());
+        for (uint32_t i = 0; i < 4096; ++i)
+            ++found[tree.leaf({(i & 15) / 16.0f, (i >> 4 & 15) / 16.0f, (i >> 8) / 16.0f})];
+        for (const uint32_t n : found) CHECK(n == 4096 / trees.leaves());
+    }
+}
+
+TEST_CASE("What brought no light leaves the trees as they were") {
+    Trees trees(GuidedSettings{});
+    trees.learn([](uint32_t) {});
+    CHECK(trees.state.tree.leaves[0].bsdf_share == 1.0f);
+    trees.learn([&](uint32_t leaf) { trees.put(leaf, {0, 0, 1}, 5); });
+    CHECK(trees.state.tree.leaves[0].bsdf_share == 0.5f);
+    const float pdf = trees.state.tree.pdf_sa(0, {0, 0, 1});
+    CHECK(pdf == Approx(4 * kInv4Pi * (1 + RefineQuads::kPrior) / (1 + 4 * RefineQuads::kPrior)));
+    trees.learn([](uint32_t) {});
+    CHECK(trees.state.tree.pdf_sa(0, {0, 0, 1}) == pdf);
+}
+
+TEST_CASE("What roulette goes by are means of what was recorded since the last update, and of all samples of a tile") {
+    Trees trees(GuidedSettings{});
+    trees.state.progress->unit[uint32_t(GuideSum::radiance)] = 0.5f;
+    for (const int64_t light : {3, 7}) {
+        trees.learn([&](uint32_t leaf) {
+            trees.put(leaf, {0, 0, 1}, 5);
+            trees.state.reflected[0] += 8, trees.state.reflected[1] += 8 * light;
+            trees.state.tiles[2] += 64, trees.state.tiles[3] += 64 * light;
+        });
+        CHECK(trees.state.tree.leaves[0].reflected == 0.5f * float(light));
+    }
+    CHECK(trees.state.over_pixel[0] == 0);  // nothing known
+    CHECK(trees.state.over_pixel[1] == Approx(1 / 2.5));
+}
+
+TEST_CASE("A leaf takes the share of the BSDF with which its records would have had the least second moment") {
+    GuidedSettings settings;
+    for (const bool learns : {true, false}) {
+        settings.learn_share = learns;
+        Trees trees(settings);
+        const auto record = [&](uint32_t leaf) {
+            trees.put_light(leaf, 100);
+            for (uint32_t k = 0; k < GuideShares::kCount; ++k)
+                trees.state.shares[leaf * GuideShares::kCount + k] = k == 6 ? 10 : 20;
+        };
+        trees.learn(record);
+        CHECK(trees.state.tree.leaves[0].bsdf_share == settings.bsdf_share);  // nothing was guided yet
+        trees.learn(record);
+        CHECK(trees.state.tree.leaves[0].bsdf_share == (learns ? GuideShares::of(6) : settings.bsdf_share));
+    }
+}
+
+TEST_CASE("What is learned depends on no thread and no size of waves, and a stopped render goes on as it would have") {
+    const Scene scene = project_scene("materials", 40, 24);
+    const RenderSettings s = guided(scene, 5);
+    const RenderResult one = render_on(1, scene, s, 12);
+    for (const int threads : {2, 7}) check_same_bits(render_on(threads, scene, s, 12), one);
+    for (const uint32_t wave_size : {64u, 4096u}) {
+        RenderSettings other = s;
+        other.wave_size = wave_size;
+        check_same_bits(render_scene(scene, other, 12), one);
+    }
+    CHECK(one.stats.memory_bytes == one.stats.memory_bytes_predicted);
+    CHECK(one.stats.invalid.total() == 0);
+
+    const auto first = make_renderer(scene, s), second = make_renderer(scene, s);
+    CHECK(first->iteration_samples() == 4);
+    CHECK_THROWS_AS(first->render(0, 6), Error);
+    first->render(0, 8);
+    const std::vector<std::byte> saved = first->save_state();
+    const FilmMoments before = first->film();
+    second->load_state(saved);
+    second->render(8, 4);
+    FilmMoments whole = second->film();
+    for (size_t i = 0; i < whole.sum.size(); ++i) whole.sum[i] += before.sum[i];
+    for (size_t i = 0; i < whole.sum.size(); ++i) CHECK(whole.sum[i] == Approx(one.film.sum[i]).epsilon(1e-12));
+    first->render(8, 4);
+    CHECK(first->save_state() == second->save_state());
+    CHECK(first->film().sum == one.film.sum);
+}
+
+TEST_CASE("Scenes without light, without surfaces that scatter, and paths of few segments") {
+    for (const int depth : {0, 1, 2, 3}) {
+        const Scene scene = project_scene("cornell", 16, 16);
+        RenderSettings s = guided(scene, 5);
+        s.max_depth = depth;
+        CHECK(render_scene(scene, s, 8).stats.invalid.total() == 0);
+    }
+}
+
+TEST_CASE("Units of light and of length change nothing that is learned") {
+    const auto room = [](double size, double radiance) {
+        return scene_from_text(fmt::format(
+            "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+            "<sensor type='perspective'><float name='fov' value='50'/><float name='near_clip' value='{0}'/><transform "
+            "name='to_world'><lookat origin='0,{1},0' target='0,0,0' up='0,0,1'/></transform><film type='hdrfilm'>"
+            "<integer name='width' value='24'/><integer name='height' value='24'/><rfilter type='box'/></film></sensor>"
+            "<shape type='cube'><transform name='to_world'><scale value='{2}'/></transform><bsdf type='twosided'>"
+            "<bsdf type='diffuse'/></bsdf></shape><shape type='rectangle'><transform name='to_world'><scale "
+            "value='{3}'/><translate z='{4}'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+            "<shape type='rectangle'><transform name='to_world'><scale value='{5}'/><translate z='{6}'/></transform>"
+            "<emitter type='area'><rgb name='radiance' value='{7}'/></emitter></shape></scene>",
+            0.001 * size, 0.9 * size, size, 0.5 * size, 0.5 * size, 0.3 * size, 0.7 * size, radiance));
+    };
+    const auto mean = [&](double size, double radiance) {
+        const Scene scene = room(size, radiance);
+        const RenderResult r = render_scene(scene, guided(scene, 7), 16);
+        CHECK(r.stats.invalid.total() == 0);
+        return mean_of(r.film) / radiance;
+    };
+    const double usual = mean(1, 1);
+    CHECK(usual > 0);
+    CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
+    for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+}
