@@ -13,10 +13,12 @@ AMBILUX_HD float turn_of(float x, float y) {
     if (!(most > 0.0f)) return 0.0f;
     const float t = min(ax, ay) / most, s = t * t;
     float p = 0.00108401687f;
-    for (const float c :
-         {-0.0053479122f, 0.0126720499f, -0.0210612528f, 0.0315250419f, -0.0530262291f, 0.159154326f})
-        p = p * s + c;
-    p *= t;
+    p = p * s - 0.0053479122f;
+    p = p * s + 0.0126720499f;
+    p = p * s - 0.0210612528f;
+    p = p * s + 0.0315250419f;
+    p = p * s - 0.0530262291f;
+    p = t * (p * s + 0.159154326f);
     if (ay > ax) p = 0.25f - p;
     if (x < 0.0f) p = 0.5f - p;
     return y < 0.0f ? 1.0f - p : p;
