@@ -30,10 +30,10 @@ struct GuideShares {
 
 /// How far learning has come.
 struct alignas(16) GuideProgress {
-    uint32_t rounds;      ///< of training that are done
-    uint32_t iterations;  ///< that are done, of this state
-    uint32_t updates;     ///< of the trees
-    uint32_t leaves;      ///< of the tree over space
+    uint32_t rounds;         ///< of training that are done
+    uint32_t iterations;     ///< that are done, of this state
+    uint32_t updates;        ///< of the trees
+    uint32_t leaves;         ///< of the tree over space
     float unit[kGuideSums];  ///< of each GuideSum; 0: not known before light was found
     uint32_t updating;       ///< the step at work makes new trees
 };

@@ -52,7 +52,9 @@ struct GuideQuads {
         float density;  ///< per area of the square
     };
 
-    AMBILUX_HD static float side(uint32_t level) { return bits_float(FloatBits(kExponentBias - level) << kFractionBits); }
+    AMBILUX_HD static float side(uint32_t level) {
+        return bits_float(FloatBits(kExponentBias - level) << kFractionBits);
+    }
     AMBILUX_HD static uint32_t child(uint32_t children, uint32_t quadrant) { return children >> 8 * quadrant & 0xffu; }
     AMBILUX_HD Vec4f probabilities(uint32_t at) const { return start_of<Vec4f>(masses[at]); }
     AMBILUX_HD static float of(Vec4f m, uint32_t quadrant) {
