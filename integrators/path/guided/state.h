@@ -25,7 +25,7 @@ struct GuideShares {
     static constexpr uint32_t kCount = 8;
     static constexpr float kMost = 0x1p28f;  ///< units that one record counts, at most
 
-    AMBILUX_HD static float of(uint32_t k) { return (float(k) + 0.5f) / float(kCount); }
+    AMBILUX_HD static float of(uint32_t k) { return 0.125f + 0.875f * (float(k) + 0.5f) / float(kCount); }
 };
 
 /// How far learning has come.
