@@ -16,8 +16,8 @@ struct GuideTraining {
     uint32_t tiles;  ///< of the film
 
     AMBILUX_HD bool trains(const Wave& wave, uint32_t slot, uint32_t by) const {
-        const uint32_t pick =
-            hash_word({tile(wave, slot), wave.state->first_sample + wave.sample_of(slot), uint32_t(wave.seed), uint32_t(wave.seed >> 32)});
+        const uint32_t pick = hash_word({tile(wave, slot), wave.state->first_sample + wave.sample_of(slot),
+                                         uint32_t(wave.seed), uint32_t(wave.seed >> 32)});
         return ((slot ^ pick) & ((1u << by) - 1)) == 0;
     }
     AMBILUX_HD bool trains(const Wave& wave, uint32_t slot) const { return trains(wave, slot, shift); }

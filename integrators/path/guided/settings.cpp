@@ -15,9 +15,10 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
         Of::flag("guide_learn_bsdf", &GuidedSettings::learn_share,
                  "every leaf takes the share of the BSDF with which what it found would have had the least second "
                  "moment"),
-        Of::flag("guide_roulette", &GuidedSettings::roulette,
-                 "Russian roulette goes by what a path is expected to bring, over what its pixel is expected to be (Vorba "
-                 "and Křivánek 2016); false: by throughput"),
+        Of::flag(
+            "guide_roulette", &GuidedSettings::roulette,
+            "Russian roulette goes by what a path is expected to bring, over what its pixel is expected to be (Vorba "
+            "and Křivánek 2016); false: by throughput"),
         Of::flag("guide_filter", &GuidedSettings::filter,
                  "what a path has found is learned at a random place within the cell around it (Müller 2019)"),
         Of::number(

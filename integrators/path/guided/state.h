@@ -25,15 +25,15 @@ struct GuideShares {
     static constexpr uint32_t kCount = 8;
     static constexpr float kMost = 0x1p28f;  ///< units that one record counts, at most
 
-    AMBILUX_HD static float of(uint32_t k) { return (float(k) + 0.5f) / float(kCount); }
+    AMBILUX_HD static float of(uint32_t k) { return 0.125f + 0.875f * (float(k) + 0.5f) / float(kCount); }
 };
 
 /// How far learning has come.
 struct alignas(16) GuideProgress {
-    uint32_t rounds;      ///< of training that are done
-    uint32_t iterations;  ///< that are done, of this state
-    uint32_t updates;     ///< of the trees
-    uint32_t leaves;      ///< of the tree over space
+    uint32_t rounds;         ///< of training that are done
+    uint32_t iterations;     ///< that are done, of this state
+    uint32_t updates;        ///< of the trees
+    uint32_t leaves;         ///< of the tree over space
     float unit[kGuideSums];  ///< of each GuideSum; 0: not known before light was found
     uint32_t updating;       ///< the step at work makes new trees
 };

@@ -13,10 +13,12 @@ AMBILUX_HD float turn_of(float x, float y) {
     if (!(most > 0.0f)) return 0.0f;
     const float t = min(ax, ay) / most, s = t * t;
     float p = 0.00108401687f;
-    for (const float c :
-         {-0.0053479122f, 0.0126720499f, -0.0210612528f, 0.0315250419f, -0.0530262291f, 0.159154326f})
-        p = p * s + c;
-    p *= t;
+    p = p * s - 0.0053479122f;
+    p = p * s + 0.0126720499f;
+    p = p * s - 0.0210612528f;
+    p = p * s + 0.0315250419f;
+    p = p * s - 0.0530262291f;
+    p = t * (p * s + 0.159154326f);
     if (ay > ax) p = 0.25f - p;
     if (x < 0.0f) p = 0.5f - p;
     return y < 0.0f ? 1.0f - p : p;
@@ -50,7 +52,9 @@ struct GuideQuads {
         float density;  ///< per area of the square
     };
 
-    AMBILUX_HD static float side(uint32_t level) { return bits_float(FloatBits(kExponentBias - level) << kFractionBits); }
+    AMBILUX_HD static float side(uint32_t level) {
+        return bits_float(FloatBits(kExponentBias - level) << kFractionBits);
+    }
     AMBILUX_HD static uint32_t child(uint32_t children, uint32_t quadrant) { return children >> 8 * quadrant & 0xffu; }
     AMBILUX_HD Vec4f probabilities(uint32_t at) const { return start_of<Vec4f>(masses[at]); }
     AMBILUX_HD static float of(Vec4f m, uint32_t quadrant) {
