@@ -61,7 +61,7 @@ def stages(a):
 
 
 def samples(a):
-    """Millions a second, of paths of up to eight segments. An experiment without errors: its references have one sample."""
+    """Millions a second, of paths of up to eight segments. An experiment without errors: its references have two samples."""
     width, height = map(int, a.size.split("x"))
     variant = "cuda_ad_rgb" if a.backend == "cuda" else "llvm_ad_rgb"
     runs = [f'[[run]]\nname = "{m}"\n' + "set = { " + ", ".join(f'{k} = "{v}"' for k, v in settings_of(m)) + " }\n" for m in a.methods]
@@ -70,7 +70,7 @@ def samples(a):
     scenes = [f'[[scene]]\nname = "{name_of(s)}"\npath = "{pathlib.Path(s).resolve()}"\nsize = [{width}, {height}]\nmax_depth = 8\n' for s in a.scenes]
     with tempfile.TemporaryDirectory() as folder:
         config = pathlib.Path(folder) / "card.toml"
-        config.write_text(f'name = "card"\nbackend = "{a.backend}"\nfilter = "box"\nseeds = {SEEDS}\n[reference]\nspp = 1\n[budget]\nspp = [{a.spp}]\n'
+        config.write_text(f'name = "card"\nbackend = "{a.backend}"\nfilter = "box"\nseeds = {SEEDS}\n[reference]\nspp = 2\n[budget]\nspp = [{a.spp}]\n'
                           + "".join(scenes + runs))
         run(a.program, "experiment", config, "-o", f"{folder}/out")
         with open(f"{folder}/out/runs.csv", newline="") as file:

@@ -78,6 +78,7 @@ TEST_CASE("Images through the fast structure are those of the good one, but for 
     const Scene scene = project_scene("cornell", 64, 64);
     RenderSettings settings;
     settings.backend = Backend::cuda;
+    settings.deterministic = true;
     const auto render = [&](Build build) {
         settings.build = build;
         const auto renderer = make_renderer(scene, settings);
@@ -98,7 +99,9 @@ TEST_CASE("Images through the fast structure are those of the good one, but for 
 
 TEST_CASE("A budget that the fast builder does not keep is kept by the good one, where it may be chosen") {
     if (no_device()) return;
-    const Scene scene = mixed(200000, 0, 1.0f);
+    Scene scene = mixed(200000, 0, 1.0f);
+    Sensor& s = scene.sensor;
+    s.film_width = s.film_height = s.crop_width = s.crop_height = 64;
     RenderSettings settings;
     settings.backend = Backend::cuda;
     settings.build = Build::fast;

@@ -74,14 +74,16 @@ uint64_t least_bytes(const Scene& scene, RenderSettings s, SharedAccels& accels)
     return make_renderer(scene, s, accels)->stats().memory_bytes_predicted;
 }
 
-/// What a renderer takes while it is made and while it renders `spp`, in its own count and by operator new.
+/// What a renderer takes while it is made and while it renders `spp`, or the next whole iterations, in its own count
+/// and by operator new.
 RenderResult render_counted(const Scene& scene, const RenderSettings& s, uint32_t spp, SharedAccels& accels) {
     // Names, records, tasks of the scheduler, the pilot's vectors: what is not counted.
     constexpr int64_t kSmall = 1 << 20;
     const int64_t before = held;
     most = before;
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, s, accels);
-    REQUIRE(renderer->render(0, spp) == spp);
+    const uint32_t iteration = renderer->iteration_samples(), samples = (spp + iteration - 1) / iteration * iteration;
+    REQUIRE(renderer->render(0, samples) == samples);
     const int64_t taken = most - before;
     const RenderStats stats = renderer->stats();
     CHECK(stats.memory_bytes == stats.memory_bytes_predicted);

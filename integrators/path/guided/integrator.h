@@ -34,12 +34,13 @@ struct PathGuidedIntegrator {
 
     struct Memory {
         typename Path::Memory path;
-        LaneArray<GuideRecord> records;
+        GuideRecords records;
     };
     static Memory lay_out(Layout& layout, const Policy& p, const WaveSize& n) {
         Memory m;
         m.path = Path::lay_out(layout, p, n);
-        m.records = layout.array<GuideRecord>(p.training.places(n.slots));
+        m.records = {layout.array<GuideRecord>(p.training.places(n.slots)),
+                     layout.allocate<uint32_t>(n.slots >> p.training.shift)};
         return m;
     }
 
@@ -87,7 +88,8 @@ struct PathGuidedIntegrator {
             static_cast<GenerateEye<F, Mis>&>(generate) = render.generate;
             static_cast<GenerateEye<F, Mis>&>(generate_training) = train.generate;
             generate.over_pixel = generate_training.over_pixel = s.over_pixel;
-            generate_training.training = p.training;
+            generate.training = generate_training.training = p.training;
+            generate.made = generate_training.made = m.records.made;
             generate_training.progress = s.progress;
             for (int k = 0; k < 2; ++k)
                 record[k] = {parts.wave, p.training, m.path.subpaths.hits[k],
@@ -109,23 +111,23 @@ struct PathGuidedIntegrator {
         for (uint32_t round = 0; round < kGuideRounds; ++round) {
             run.for_waves([round](auto& exec, const Stages& all) {
                 const Stages s = all.of_round(round);
-                paths(exec, s, s.train, s.generate_training);
+                paths<false>(exec, s, s.train, s.generate_training);  // of some slots alone
             });
             run.once([round](auto& exec, const Stages& s) { learn(exec, s, round); });
         }
-        run.for_waves([](auto& exec, const Stages& s) { paths(exec, s, s.render, s.generate); });
+        run.for_waves([](auto& exec, const Stages& s) { paths<kFusion.generate>(exec, s, s.render, s.generate); });
         run.once([](auto& exec, const Stages& s) { learn(exec, s, kGuideRounds); });
     }
 
 private:
     static constexpr uint32_t kMostShift = 6;  ///< of GuideTraining: one slot of a tile
 
-    /// One wave.
-    template <class Executor, class Generate>
+    /// One wave. `kFused`: camera rays are made and traced at once, in all slots.
+    template <bool kFused, class Executor, class Generate>
     static void paths(Executor& exec, const Stages& s, const typename Path::Stages& p, const Generate& generate) {
         if (p.policy.rules.max_depth == 0) return;
         const uint32_t slots = p.wave.tiles * kTilePixels;
-        start_eye_subpaths<kFusion.generate>(exec, generate, p.extend[0], slots);
+        start_eye_subpaths<kFused>(exec, generate, p.extend[0], slots);
         repeat_depths(
             exec, p.eye_vertex, p.extend, 0,
             [&](bool several_bounces) {

@@ -32,7 +32,7 @@ struct GuideTraining {
 /// A scattered ray.
 struct GuideRecord {
     Vec3f p;
-    float pdf_sa;         ///< of its direction; 0: there is no record
+    float pdf_sa;         ///< of its direction
     uint32_t direction;   ///< in the unit square, twice 16 bits
     float brought;        ///< luminance that the path had brought before
     float before, after;  ///< luminance of its throughput before it was scattered and after
@@ -43,10 +43,18 @@ struct GuideRecord {
     }
 };
 
-/// Camera rays that know what their pixel is expected to be.
+/// Records of a wave. A slot that trains has those whose bits are set, one for each vertex.
+struct GuideRecords {
+    LaneArray<GuideRecord> of_vertices;
+    uint32_t* made;  ///< by slot that trains
+};
+
+/// Camera rays that know what their pixel is expected to be, in slots that have no records yet.
 template <class Generate>
 struct GenerateGuided : Generate {
     const float* over_pixel = nullptr;  ///< by tile
+    GuideTraining training{};
+    uint32_t* made = nullptr;  ///< GuideRecords
 
     using Ray = typename Generate::Items::Ray;
 
@@ -56,6 +64,7 @@ struct GenerateGuided : Generate {
     }
     AMBILUX_HD bool make(uint32_t slot, Ray& ray) const {
         if (!Generate::make(slot, ray)) return false;
+        if (training.trains(this->wave, slot)) made[slot >> training.shift] = 0;
         GuidedSums sums = {};
         sums.over_pixel = over_pixel[GuideTraining::tile(this->wave, slot)];
         ray.more = Ray::Sums::pack(sums).more;
@@ -66,7 +75,6 @@ struct GenerateGuided : Generate {
 /// Those of the slots that train in this round.
 template <class Generate>
 struct GenerateTraining : Generate {
-    GuideTraining training;
     uint32_t share = 0;  ///< one of 2^share slots, at most those that train
     const GuideProgress* progress = nullptr;
     uint32_t round = 0;
@@ -78,7 +86,7 @@ struct GenerateTraining : Generate {
         if (make(slot, ray)) this->rays.push(ray);
     }
     AMBILUX_HD bool make(uint32_t slot, Ray& ray) const {
-        return progress->rounds == round && training.trains(this->wave, slot, max(share, training.shift)) &&
+        return progress->rounds == round && this->training.trains(this->wave, slot, max(share, this->training.shift)) &&
                Generate::make(slot, ray);
     }
 };
@@ -93,7 +101,7 @@ struct RecordRays {
     Wave wave;
     GuideTraining training;
     Queue<HitItem<RayItem>> hits;
-    LaneArray<GuideRecord> records;
+    GuideRecords records;
     const Lane* samples;
     StageRecord* record;
 
@@ -105,9 +113,10 @@ struct RecordRays {
         const Subpath<Mis> path = Items::unpack(ray);
         const float pdf_sa = path.sums.pdf_sa, before = path.sums.before, after = luminance(path.throughput);
         if (!(pdf_sa > 0.0f && pdf_sa < kInfinity && before > 0.0f && after > 0.0f)) return;
-        records.store(training.place(ray.path) + depth - 2,
-                      {path.origin, pdf_sa, GuideRecord::pack(square_of_direction(path.direction)),
-                       luminance(start_of<Rgb>(samples[ray.path])), before, after});
+        records.made[ray.path >> training.shift] |= 1u << (depth - 2);
+        records.of_vertices.store(training.place(ray.path) + depth - 2,
+                                  {path.origin, pdf_sa, GuideRecord::pack(square_of_direction(path.direction)),
+                                   luminance(start_of<Rgb>(samples[ray.path])), before, after});
     }
 };
 
@@ -122,7 +131,7 @@ struct LearnRecords {
     GuideTraining training;
     GuidedSettings settings;
     GuidedState state;
-    LaneArray<GuideRecord> records;
+    GuideRecords records;
     const Lane* samples;
     StageRecord* record;
     uint32_t share = 0;  ///< as of GenerateTraining
@@ -133,11 +142,10 @@ struct LearnRecords {
         if (!wave.locate(slot).active) return;
         const float brought = luminance(start_of<Rgb>(samples[slot]));
         add(state.tiles + 2 * GuideTraining::tile(wave, slot), brought);
-        for (uint32_t k = 0; k < GuideTraining::kDepths; ++k) {
-            const uint32_t place = training.place(slot) + k;
-            const GuideRecord r = records.load(place);
-            if (r.pdf_sa == 0.0f) continue;
-            records.store(place, {});
+        const uint32_t made = records.made[slot >> training.shift];
+        for (uint32_t k = 0; made >> k; ++k) {
+            if (!(made >> k & 1u)) continue;
+            const GuideRecord r = records.of_vertices.load(training.place(slot) + k);
             const float found = max(brought - r.brought, 0.0f), squared = sqr(found / r.before);
             if (!(squared < kInfinity)) continue;
             const Vec3f x = state.tree.unit(r.p);
