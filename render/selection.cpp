@@ -32,7 +32,7 @@ constexpr double kDoubt = 1.3;
 /// Others whose product is within this factor may be as good.
 constexpr double kNear = 1.6;
 /// In a render of so many seconds or more the best of up to so many families are tried out, each for this share of it.
-constexpr double kLongRender = 4, kTrialShare = 0.01;
+constexpr double kLongRender = 10, kTrialShare = 0.005;
 constexpr size_t kTried = 3;
 /// A trial of so many times the pilot's paths knows variances better than the pilot, but for those that it finds to be
 /// less than predicted by more than this factor.
@@ -83,12 +83,13 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+bool learns(const SelectionCandidate& c) { return c.offer.least_subpaths > 0; }
+
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
 /// that of the others.
 uint32_t family(const SelectionCandidate& c) {
-    const bool learns = c.offer.least_subpaths > 0;
     return (c.pilot.light_subpaths != 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0) +
-           (learns ? 8 : 0);
+           (learns(c) ? 8 : 0);
 }
 
 /// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of
@@ -294,8 +295,9 @@ private:
         return found;
     }
 
-    /// Replaces work by time for those that are tried, and predicted variances by what many more paths than the pilot's
-    /// have. A variance that is much less than predicted stays: the pilot knows of light that single hits bring.
+    /// Replaces work by time for those that are tried and do not spend a trial on learning, and predicted variances by
+    /// what many more paths than the pilot's have. A variance that is much less than predicted stays: the pilot knows
+    /// of light that single hits bring.
     void try_out(const std::vector<size_t>& tried, const Pilot& pilot) {
         if (tried.size() < 2) return;
         std::vector<Measured> of;
@@ -313,7 +315,7 @@ private:
         for (size_t i = 0; i < tried.size(); ++i) {
             const size_t c = tried[i];
             seconds_[c] = of[i].seconds;
-            cost_[c] = of[i].seconds * rays_per_second;
+            if (!learns(candidates_[c])) cost_[c] = of[i].seconds * rays_per_second;
             if (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i]) variance_[c] = seen[i];
         }
         // Others stay where they were beside the one that was the best.
