@@ -1,5 +1,5 @@
-// A wide BVH in a hundredth of the time that the good one takes (accel/cwbvh.h), by data-parallel steps that a host and
-// a device run alike, to the same bits.
+// A wide BVH in a small part of the time that the good one takes (accel/cwbvh.h), by data-parallel steps that a host
+// and a device run alike, to the same bits.
 #pragma once
 
 #include <vector>

@@ -124,8 +124,8 @@ std::vector<Setting> main_settings() {
             .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
         Is(Of::choice(
             "build", &S::build, {"auto", "fast", "good"},
-            "how cwbvh is built: fast, by the device; good, by the CPU, in a hundred times as long, for rays "
-            "that are up to a third faster; auto: fast on CUDA for scenes of a million triangles and more, or "
+            "how cwbvh is built: fast, by the device; good, by the CPU, in 25 to 700 times as long, for rays "
+            "that are up to half as fast again; auto: fast on CUDA for scenes of a million triangles and more, or "
             "where the good one would take a fifth of the time that is given (--time); good in experiments "
             "and with deterministic=true")),
         Is(memory()),

@@ -44,7 +44,7 @@ enum class AccelKind : uint32_t { automatic, embree, cwbvh, bvh2 };
 /// How that of CUDA is built.
 enum class Build : uint32_t {
     automatic,  ///< fast on a device, for scenes of many triangles (may_build_fast); else good
-    fast,       ///< in a hundredth of the time (backends/fast_build.h)
+    fast,       ///< in a small part of the time (backends/fast_build.h)
     good,       ///< for long renders
 };
 
