@@ -9,11 +9,10 @@
 #include "backends/cuda/mean_on_device.h"
 #include "backends/cuda/picture_on_device.h"
 #include "backends/cuda_device.h"
-#include "backends/fast_cwbvh.h"
 #include "backends/fusion.h"
 #include "core/flag.h"
-#include "core/log.h"
 #include "core/seconds.h"
+#include "render/device_structure.cuh"
 #include "render/state_memory.h"
 
 namespace ambilux {
@@ -36,13 +35,27 @@ public:
     static uint32_t threads() { return 0; }
     static BackendBytes bytes() { return {device_primitive_bytes(), order_temporary_bytes}; }
     const std::string& device() const { return device_name_; }
-    const char* accel() const { return pairs_ ? "bvh2" : "cwbvh"; }
+    const char* accel() const { return structure_.pairs() ? "bvh2" : "cwbvh"; }
 
     // ---- scene and memory ----
 
     /// The structure on the host, and what the pilot traces with.
     HostTracer find_structure(SharedAccels& accels) {
-        const HostTracer tracer = find_tracer(accels);
+        constexpr bool kPilot =
+            requires(HostTracer t) { Integrator::pilot(maker_.policy, maker_.view, t, uint64_t()); };
+        const bool fast = maker_.settings.build == Build::fast;
+        if (fast) {
+            const auto start = Clock::now();
+            device_scene_ = accels.get<DeviceScene>();
+            upload_seconds_ = seconds_since(start);
+        }
+        const HostTracer tracer =
+            structure_.find(maker_.scene, maker_.settings, accels, fast ? room(scene_bytes().total()) : 0, kPilot);
+        if (structure_.fast()) peak_ = device_scene_->bytes() + structure_.fast()->peak_bytes();
+        accel_bytes_ = structure_.bytes();
+        if constexpr (requires { Stages::kTracesConnections; })
+            maker_.policy.traces_connections =
+                Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
         if (maker_.picks_by_tree()) accel_bytes_ += light_tree_bytes(maker_.scene);
         return tracer;
     }
@@ -50,27 +63,20 @@ public:
         device_scene_ = accels.get<DeviceScene>();
         maker_.view = device_scene_->view();
         maker_.view.sensor = maker_.scene.sensor;  // the copy may have been made for a renderer with another camera
-        if (host_pairs_) {
-            pairs_.emplace(host_pairs_->arrays());
-            host_pairs_.reset();
-        } else {
-            accel_ = fast_ ? fast_ : accels.get<DeviceCwbvh>();
-            maker_.tracer = accel_->tracer();
-        }
+        structure_.upload(accels, maker_.tracer);
         if (maker_.picks_by_tree()) {
             light_tree_ = accels.get<DeviceLightTree>();
             maker_.view.light_tree = light_tree_->view();
         }
         device_scene_->drop_texels();
     }
-    Build build() const { return fast_ ? Build::fast : Build::good; }
+    Build build() const { return structure_.fast() ? Build::fast : Build::good; }
     /// Of what was copied before the structure was made.
     double upload_seconds() const { return upload_seconds_; }
     SceneBytes scene_bytes() const { return ambilux::scene_bytes(maker_.scene, maker_.settings.textures); }
     uint64_t accel_bytes() const { return accel_bytes_; }
     uint64_t resident_scene_bytes() const {
-        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) +
-               (light_tree_ ? light_tree_->bytes() : 0);
+        return device_scene_->bytes() + structure_.resident_bytes() + (light_tree_ ? light_tree_->bytes() : 0);
     }
     /// A clock, and an image and pictures that may be asked for.
     uint64_t other_bytes() const { return sizeof(uint64_t) + image_bytes() + PicturesOnDevice::kBytes; }
@@ -154,48 +160,6 @@ public:
     }
 
 private:
-    HostTracer find_tracer(SharedAccels& accels) {
-        if (maker_.settings.accel == AccelKind::bvh2) {
-            host_pairs_.emplace(maker_.scene);
-            accel_bytes_ = host_pairs_->arrays().bytes();
-            return {};
-        }
-        HostTracer tracer;
-        if (build_fast(accels)) {
-            accel_bytes_ = fast_->bytes();
-            if constexpr (requires { Integrator::pilot(maker_.policy, maker_.view, tracer, uint64_t(0)); })
-                tracer = HostTracer(accels.get<FastCwbvhAccel>()->tracer());  // the same, to the bit
-        } else {
-            const auto accel = accels.get<CwbvhAccel>();
-            accel_bytes_ = accel->arrays().bytes();
-            tracer = HostTracer(accel->tracer());
-        }
-        if constexpr (requires { Stages::kTracesConnections; })
-            maker_.policy.traces_connections =
-                Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
-        return tracer;
-    }
-    /// False if that is not asked for and, with a line in the log, if memory or the depth of the tree forbids it.
-    bool build_fast(SharedAccels& accels) {
-        if (maker_.settings.build != Build::fast) return false;
-        try {
-            const auto start = Clock::now();
-            device_scene_ = accels.get<DeviceScene>();
-            upload_seconds_ = seconds_since(start);
-            const uint64_t needed = DeviceFastCwbvh::predicted_peak_bytes(maker_.scene.view()),
-                           room = this->room(scene_bytes().total());
-            if (needed > room)
-                throw Error(ExitCode::device, "build=fast: it needs " + std::to_string(needed >> 20) +
-                                                  " MiB for a while, of " + std::to_string(room >> 20) + " there are");
-            fast_ = accels.get<DeviceFastCwbvh>();
-            peak_ = device_scene_->bytes() + fast_->peak_bytes();
-            return true;
-        } catch (const Error& e) {
-            if (!maker_.settings.may_build_fast) throw;
-            log_info(std::string(e.what()) + ". The good builder takes over");
-            return false;
-        }
-    }
     /// What is launched for each wave of a phase.
     struct Phase {
         Owned<cudaGraphExec_t> graph;
@@ -344,7 +308,7 @@ private:
         DeviceMemory::put(layout_.counters(), counters.data(), counters.size() * sizeof(QueueCounter));
         executor_.emplace(stream_.get(), traced_, state_, clock_.data(), maker_.view, wave_.order);
         if constexpr (!Maker::kFilmWide)
-            if (pairs_) executor_->use(pairs_->tracer());
+            if (structure_.pairs()) executor_->use(structure_.pairs()->tracer());
         phases_.clear();
         const auto start = Clock::now();
         if (maker_.settings.graph) {
@@ -395,13 +359,10 @@ private:
     Maker& maker_;
     Features traced_;                               ///< what rays are traced for
     std::string device_name_ = cuda_device_name();  ///< asked for once: statistics are read often
-    std::optional<PairAccel> host_pairs_;           ///< until they are on the device
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceLightTree> light_tree_;  ///< light_picking=tree only
-    std::shared_ptr<const DeviceCwbvh> accel_;
-    std::shared_ptr<const DeviceFastCwbvh> fast_;  ///< it, if the device has built it
-    double upload_seconds_ = 0;                    ///< of the scene, before the structure
-    std::optional<DevicePairs> pairs_;             ///< instead, with accel=bvh2
+    DeviceStructure structure_;
+    double upload_seconds_ = 0;  ///< of the scene, before the structure
     uint64_t accel_bytes_ = 0, held_ = 0, peak_ = 0;
     DeviceMemory memory_;
     Layout layout_;

@@ -21,11 +21,6 @@
 namespace ambilux {
 namespace {
 
-/// Share of the blocks that the comparison leaves out.
-constexpr double kTrimmedBlocks = 0.01;
-/// What every candidate has beside the variance that a pilot sees, in multiples of the median candidate's: fitted to
-/// the project's own scenes (docs/lab/2026-11-28-regret.md).
-constexpr double kUnseen = 0.2;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
@@ -45,29 +40,6 @@ std::string joined(const SettingTexts& settings) {
     return text;
 }
 
-RenderSettings settings_of(const RenderSettings& settings, const SelectionCandidate& candidate) {
-    RenderSettings s = settings;
-    s.automatic = false;
-    s.allow = Allow::unbiased;
-    for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
-    if (!variant_of(s).traits.draws_together) s.draws = CacheDraws::automatic;  // others have no draws to be set
-    return s;
-}
-
-SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, float light_paths) {
-    SelectionCandidate c;
-    c.name = variant.integrator + offer.suffix;
-    c.pilot = {light_paths, offer.connect, offer.worth};
-    c.settings = {{"integrator", variant.integrator}, {"variant", variant.variant}};
-    c.settings.insert(c.settings.end(), offer.settings.begin(), offer.settings.end());
-    if (light_paths != 0.0f && light_paths != 1.0f) {
-        c.name += fmt::format(", {} light subpaths per pixel", light_paths);
-        c.settings.emplace_back("light_paths", fmt::format("{}", light_paths));
-    }
-    c.offer = std::move(offer);
-    return c;
-}
-
 /// Eye subpaths of a pilot: a few hundredths of the time of a render that ends by the clock, on 2 cores and on the 16
 /// beside a GPU. With half of the most for a device, one seed in ten (water-caustic) or two (veach-ajar) put a
 /// candidate first that is 1.1 to 1.5 times worse.
@@ -75,12 +47,6 @@ uint32_t pilot_samples(const RenderSettings& settings, bool cuda) {
     const double most = cuda ? 32768 : 8192, for_seconds = cuda ? 2 : 4, least = 4096;
     if (settings.expected_samples > 0 || !(settings.expected_seconds > 0)) return uint32_t(most);
     return uint32_t(std::clamp(most * settings.expected_seconds / for_seconds, least, most));
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 bool learns(const SelectionCandidate& c) { return c.offer.least_subpaths > 0; }
@@ -118,67 +84,6 @@ double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeR
     if (count == 1 && once >= kLongEnough) return once;
     return seconds_of(kFirstTimedSample + 1, count) / count;
 }
-
-}  // namespace
-
-std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda) {
-    const Variant& asked = variant_of(settings);
-    std::vector<SelectionCandidate> all;
-    for (const float light_paths : {0.0f, 0.25f, 1.0f, 4.0f})
-        for (const Variant& v : variants()) {
-            if (!v.selection) continue;
-            for (SelectionOffer& offer : v.selection({settings, asked.traits, &v == &asked, cuda, light_paths}))
-                all.push_back(candidate_of(v, std::move(offer), light_paths));
-        }
-    std::stable_partition(all.begin(), all.end(), [](const SelectionCandidate& c) { return !c.offer.measured; });
-    return all;
-}
-
-double selection_work(const PilotWork& w, const SelectionCandidate& candidate, bool cuda) {
-    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of subpaths; what the longer records
-    // and further launches of bidirectional methods cost.
-    const double eye = w.eye_rays + kShadowWork * w.next_events,
-                 light = double(candidate.pilot.light_subpaths) * (w.light_rays + kShadowWork * w.splats);
-    const double pair = cuda ? 0.24 : 0.02, draw = cuda ? 0.12 : 0.07, ray = cuda ? 1.06 : 0.8,
-                 bidirectional = cuda ? 1.2 : 1.0;
-    const PilotCandidate& c = candidate.pilot;
-    if (c.light_subpaths == 0.0f && !c.connect) return eye;
-    double work = eye + light;
-    if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
-    if (c.connect) work += candidate.offer.draws * (draw * w.draws + ray * w.draw_rays);
-    work *= candidate.offer.work;
-    const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
-    // A light subpath for every vertex of an eye subpath.
-    if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
-    return bidirectional * work;
-}
-
-std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance) {
-    const size_t blocks = variance[0].size();
-    std::vector<std::pair<double, size_t>> worst(blocks);
-    for (size_t b = 0; b < blocks; ++b) {
-        worst[b] = {kInfinity, b};
-        for (const std::vector<double>& of : variance) worst[b].first = std::min(worst[b].first, of[b]);
-    }
-    std::sort(worst.begin(), worst.end());
-    const size_t kept = blocks - size_t(kTrimmedBlocks * double(blocks));
-    std::vector<double> means;
-    for (const std::vector<double>& of : variance) {
-        double sum = 0;
-        for (size_t i = 0; i < kept; ++i) sum += of[worst[i].second];
-        means.push_back(std::max(sum / double(kept), 1e-12));
-    }
-    return means;
-}
-
-std::vector<double> selection_variances(const Pilot& pilot) {
-    std::vector<double> means = trimmed_means(pilot.variance);
-    const double unseen = kUnseen * median(means);
-    for (double& mean : means) mean += unseen;
-    return means;
-}
-
-namespace {
 
 /// One selection: a pilot predicts, what it cannot tell apart is timed, and the best that finds memory is made.
 class Selection {

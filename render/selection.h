@@ -17,6 +17,8 @@ struct SelectionCandidate {
     SelectionOffer offer;
 };
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
+/// `settings` with those of a candidate, and no longer automatic.
+RenderSettings settings_of(const RenderSettings& settings, const SelectionCandidate& candidate);
 
 /// The rays and connections of one sample of a pixel, in multiples of one ray of a path tracer.
 double selection_work(const PilotWork& work, const SelectionCandidate& candidate, bool cuda);

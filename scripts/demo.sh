@@ -15,7 +15,11 @@ else
   scripts/setup.sh demo
   # A folder of its own: that of scripts/test.sh may hold kernels.
   build="${AMBILUX_BUILD_DIR:-$root/build-demo}"
-  AMBILUX_CMAKE_ARGS="-DAMBILUX_CUDA=$(cuda_where_it_runs) -DAMBILUX_PYTHON=OFF -DAMBILUX_TESTS=OFF ${AMBILUX_CMAKE_ARGS:-}"
+  # The levels of features that its scenes need and the one that holds all, the host's code at -O1.
+  levels="Diffuse;Untextured;All"
+  say "demo: built for a quick start, for scenes as these (docs/building.md); scripts/build.sh builds what figures are to come from"
+  AMBILUX_CMAKE_ARGS="-DAMBILUX_CPU_LEVELS=$levels -DAMBILUX_CUDA_LEVELS=$levels -DAMBILUX_CPU_OPTIMISE=OFF
+    -DAMBILUX_CUDA=$(cuda_where_it_runs) -DAMBILUX_PYTHON=OFF -DAMBILUX_TESTS=OFF ${AMBILUX_CMAKE_ARGS:-}"
   configure_and_build ambilux
   program=("$(ambilux_program)")
 fi
