@@ -44,7 +44,7 @@ def rays(a):
     """Millions a second, by batch."""
     found = {scene: {row["batch"]: row["mrays_per_s"] for row in of_bench(a, "rays", scene)["rows"]} for scene in a.scenes}
     batches = list(dict.fromkeys(batch for of_scene in found.values() for batch in of_scene))
-    table(["Mrays/s", *batches], [[name_of(scene), *(f"{of_scene[b]:.0f}" if b in of_scene else "" for b in batches)] for scene, of_scene in found.items()])
+    table(["Mrays/s", *batches], [[name_of(scene), *(f"{of_scene[b]:.4g}" if b in of_scene else "" for b in batches)] for scene, of_scene in found.items()])
 
 
 def stages(a):
@@ -60,13 +60,25 @@ def stages(a):
     table(["scene", "method", "stages by time, ns an item", "", "", ""], rows)
 
 
+def label(method):
+    """As a run may be called."""
+    return method.replace(" ", "-").replace("=", "-")
+
+
+def run_of(method):
+    """In a configuration."""
+    settings = dict(settings_of(method))
+    keys = "".join(f'{key} = "{settings.pop(key)}"\n' for key in ("integrator", "variant") if key in settings)
+    return f'[[run]]\nname = "{label(method)}"\n{keys}set = {{ {", ".join(f"{k} = {v}" for k, v in settings.items())} }}\n'
+
+
 def samples(a):
     """Millions a second, of paths of up to eight segments. An experiment without errors: its references have two samples."""
     width, height = map(int, a.size.split("x"))
     variant = "cuda_ad_rgb" if a.backend == "cuda" else "llvm_ad_rgb"
-    runs = [f'[[run]]\nname = "{m}"\n' + "set = { " + ", ".join(f'{k} = "{v}"' for k, v in settings_of(m)) + " }\n" for m in a.methods]
+    runs = [run_of(method) for method in a.methods]
     if os.environ.get("AMBILUX_PEERS_PYTHON"):
-        runs.append(f'[[run]]\nname = "mitsuba path"\nrenderer = "mitsuba"\nintegrator = "path"\nvariant = "{variant}"\n')
+        runs.append(f'[[run]]\nname = "mitsuba-path"\nrenderer = "mitsuba"\nintegrator = "path"\nvariant = "{variant}"\n')
     scenes = [f'[[scene]]\nname = "{name_of(s)}"\npath = "{pathlib.Path(s).resolve()}"\nsize = [{width}, {height}]\nmax_depth = 8\n' for s in a.scenes]
     with tempfile.TemporaryDirectory() as folder:
         config = pathlib.Path(folder) / "card.toml"
@@ -79,7 +91,7 @@ def samples(a):
 
     def rate(scene, name):
         times = [float(row["time"]) / float(row["spp"]) for row in found if row["scene"] == name_of(scene) and row["run"] == name]
-        return f"{width * height / statistics.median(times) / 1e6:.0f}" if times else ""
+        return f"{width * height / statistics.median(times) / 1e6:.3g}" if times else ""
 
     table([f"Msamples/s, {a.size}", *names], [[name_of(scene), *(rate(scene, name) for name in names)] for scene in a.scenes])
 
