@@ -28,7 +28,8 @@ struct SubpathQueues {
     }
 };
 
-/// Hits of camera rays, in place 0. `Fused`: an executor that can do so makes and traces the rays in one launch.
+/// Hits of camera rays, in place 0. `kFused`: an executor that can do so makes and traces the rays in one launch, for
+/// which `generate` has to make one in every active slot.
 template <bool kFused, class Executor, class Generate, class Extend>
 void start_eye_subpaths(Executor& exec, const Generate& generate, const Extend& extend, uint32_t slots) {
     if constexpr (kFused)
