@@ -213,7 +213,9 @@ private:
             of.push_back(*m);
             variances.push_back(m->variance);
         }
-        const double rays_per_second = work_[tried[0]] / of[0].seconds, before = variance_[tried[0]];
+        // Of one whose time is not learning.
+        const size_t clock = learns(candidates_[tried[0]]) ? 1 : 0;
+        const double rays_per_second = work_[tried[clock]] / of[clock].seconds, before = variance_[tried[0]];
         const std::vector<double> seen = trimmed_means(variances);
         double fewest = kInfinity;
         for (const Measured& m : of) fewest = std::min(fewest, m.samples * pixels());

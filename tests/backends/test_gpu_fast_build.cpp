@@ -9,19 +9,13 @@
 #include "render/renderer.h"
 #include "tests/support/accel_scenes.h"
 #include "tests/support/catch.h"
+#include "tests/support/gpu_device.h"
 #include "tests/support/render_scene.h"
-#include "tests/support/skip.h"
 
 using namespace ambilux;
 using namespace ambilux::accel_test;
 
 namespace {
-
-bool no_device() {
-    if (cuda_device_present()) return false;
-    skip("no CUDA device: skipped");
-    return true;
-}
 
 template <class T>
 bool same(const std::vector<T>& a, const std::vector<T>& b) {
@@ -54,7 +48,7 @@ Scene mixed(uint32_t triangles, uint32_t quadrics, float scale) {
 }  // namespace
 
 TEST_CASE("A device builds what a host builds, to the bit") {
-    if (no_device()) return;
+    if (!device()) return;
     check_same("nothing", Scene{});
     Scene one;
     add_mesh(one, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 1, 2});
@@ -74,7 +68,7 @@ TEST_CASE("A device builds what a host builds, to the bit") {
 }
 
 TEST_CASE("Images through the fast structure are those of the good one, but for rays through edges") {
-    if (no_device()) return;
+    if (!device()) return;
     const Scene scene = project_scene("cornell", 64, 64);
     RenderSettings settings;
     settings.backend = Backend::cuda;
@@ -98,7 +92,7 @@ TEST_CASE("Images through the fast structure are those of the good one, but for 
 }
 
 TEST_CASE("A budget that the fast builder does not keep is kept by the good one, where it may be chosen") {
-    if (no_device()) return;
+    if (!device()) return;
     Scene scene = mixed(200000, 0, 1.0f);
     Sensor& s = scene.sensor;
     s.film_width = s.film_height = s.crop_width = s.crop_height = 64;
