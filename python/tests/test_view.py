@@ -69,6 +69,13 @@ def frame(url, wanted=lambda facts: True, seconds=30, query=""):
     raise AssertionError("no such frame")
 
 
+def look(viewer, camera, wanted=lambda facts: True):
+    """The first frame that is wanted from a camera that is asked for; what was rendered before it does not count."""
+    status, asked = post(viewer + "camera", camera)
+    assert status == 200, asked
+    return frame(viewer, lambda f: f["asked"] >= asked and wanted(f))
+
+
 def test_frames_become_the_image(viewer):
     facts, pixels = frame(viewer, lambda f: f["samples"] >= 256 and "error" in f)
     assert pixels.shape == (72, 96, 3) and facts["problem"] == "" and facts["method"] == "path wavefront"
@@ -97,18 +104,15 @@ def test_the_camera_moves_and_returns(viewer):
     with urllib.request.urlopen(viewer + "scene") as answer:
         camera = json.load(answer)["camera"]
     _, before = frame(viewer, lambda f: f["samples"] >= 4)
-    assert post(viewer + "camera", {**camera, "origin": [3.0, 1.5, 3.0]})[0] == 200
-    facts, moved = frame(viewer, lambda f: f["samples"] >= 4 and "error" not in f and f["width"] == 96)
+    facts, moved = look(viewer, {**camera, "origin": [3.0, 1.5, 3.0]}, lambda f: f["samples"] >= 4 and f["width"] == 96)
+    assert "error" not in facts
     assert np.abs(moved.astype(int) - before).mean() > 10
     # The camera of the file, said in other words, gives the same picture: the error is measured for the file's alone.
-    assert post(viewer + "camera", camera)[0] == 200
-    time.sleep(0.5)
-    _, same = frame(viewer, lambda f: f["samples"] >= 8 and f["width"] == 96)
+    _, same = look(viewer, camera, lambda f: f["samples"] >= 8 and f["width"] == 96)
     assert np.abs(same.astype(int) - before).mean() < 10
     for wrong in ({**camera, "target": camera["origin"]}, {"origin": [1, 2]}, {**camera, "up": [1e39, 0, 0]}):
         assert post(viewer + "camera", wrong)[0] == 400
-    assert post(viewer + "camera", {"reset": True})[0] == 200
-    frame(viewer, lambda f: "error" in f)
+    look(viewer, {"reset": True}, lambda f: "error" in f)
 
 
 def test_a_picture_says_what_it_answers_and_what_it_took(viewer):
@@ -122,9 +126,8 @@ def test_a_picture_says_what_it_answers_and_what_it_took(viewer):
         assert facts["samples"] >= 1 and {"restart", "first_sample", "picture"} <= facts["picture_seconds"].keys()
     assert numbers == sorted(set(numbers))
     # The same camera at rest does not begin anew where the picture is whole already.
-    asked = post(viewer + "camera", {**camera, "origin": [3.0, 1.5, 3.4], "moving": False})[1]
-    assert frame(viewer, lambda f: f["asked"] >= asked)[0]["width"] == 96
-    assert post(viewer + "camera", {"reset": True})[0] == 200
+    assert look(viewer, {**camera, "origin": [3.0, 1.5, 3.4], "moving": False})[0]["width"] == 96
+    look(viewer, {"reset": True})
 
 
 def test_a_jpeg_shows_the_same_picture(viewer):
