@@ -12,6 +12,13 @@ std::string format_duration(double seconds);
 /// Number with k, M or G: "12.3 M".
 std::string format_count(double value);
 
+/// Where long work stands, for who shows it by other means.
+struct ProgressReport {
+    double fraction = 0;       ///< done, in [0,1]
+    std::string details;       ///< what is in work
+    double seconds_left = -1;  ///< negative: not known
+};
+
 class Progress {
 public:
     /// `terminal`: whether standard error is one; pass explicitly in tests only. `plain_interval`: seconds between

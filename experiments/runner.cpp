@@ -138,6 +138,7 @@ private:
     void show(const std::string& what) {
         dealer_.listen();
         if (progress_) progress_->update(work_.fraction(), what, work_.seconds_left());
+        if (request_.on_progress) request_.on_progress({work_.fraction(), what, work_.seconds_left()});
     }
 
     bool make_scene_reference(size_t index) {

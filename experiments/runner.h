@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/progress.h"
 #include "session/hooks.h"
 
 namespace ambilux {
@@ -17,7 +18,8 @@ struct ExperimentRequest {
                              ///< making them again
     bool resume = false;
     const volatile bool* interrupt = nullptr;
-    std::function<void()> on_prepared = {};    ///< called once all is checked, before the first render; may be empty
+    std::function<void()> on_prepared = {};  ///< called once all is checked, before the first render; may be empty
+    std::function<void(const ProgressReport&)> on_progress = {};  ///< called after each batch; may be empty
     bool shared_devices = false;               ///< ranks may share devices or cores, budgets in seconds included
     bool reduced = false;                      ///< as the section [reduced] of the configuration says
     double reference_checkpoint_seconds = 30;  ///< how often a reference is saved

@@ -24,7 +24,7 @@ else
   program=("$(ambilux_program)")
 fi
 start=$SECONDS
-"${program[@]}" experiment experiments/demo.toml -o out/demo --resume
+"${program[@]}" experiment experiments/demo.toml -o out/demo --references scenes/references --resume
 say "demo: the experiment took $((SECONDS - start)) s"
 made=$SECONDS
 "$python" -m ambilux.analysis out/demo -o out/demo

@@ -25,7 +25,7 @@ except ModuleNotFoundError as error:
 else:
     from ambilux.commands import Sweep, convert, devices, info, light_vertices, stress, stress_export, stress_families, stress_judge, trace
     from ambilux.errors import AmbiluxNote, AmbiluxWarning, DeviceError, SceneError, UsageError
-    from ambilux.experiments import Results, experiment
+    from ambilux.experiments import Progress, Results, experiment
     from ambilux.image import DeviceArray, Image, StrategyImage, compare, read
     from ambilux.params import Params
     from ambilux.records import Record
@@ -33,6 +33,6 @@ else:
     from ambilux.replays import Outlier, Trace
     from ambilux.scene import Scene, load
 
-__all__ = ["AmbiluxNote", "AmbiluxWarning", "DeviceArray", "DeviceError", "Image", "Outlier", "Params", "Record", "Results", "Scene", "SceneError", "Step", "StrategyImage",
+__all__ = ["AmbiluxNote", "AmbiluxWarning", "DeviceArray", "DeviceError", "Image", "Outlier", "Params", "Progress", "Record", "Results", "Scene", "SceneError", "Step", "StrategyImage",
            "Sweep", "Trace", "UsageError", "__version__", "compare", "convert", "cuda_available", "devices", "experiment", "git_revision", "info", "light_vertices", "load", "progressive",
            "read", "reference", "render", "settings_help", "stress", "stress_export", "stress_families", "stress_judge", "trace"]

@@ -21,8 +21,10 @@ void bind_replays(nanobind::module_& m);
 void bind_commands(nanobind::module_& m);
 
 /// Does the work on a thread of its own, without Python's lock, and looks at Python's signals meanwhile: one whose
-/// handler throws (KeyboardInterrupt) sets the flag that `work` gets, and is thrown once that has returned.
-void run_unlocked(const std::function<void(const volatile bool* interrupt)>& work);
+/// handler throws (KeyboardInterrupt) sets the flag that `work` gets, and is thrown once that has returned. So does an
+/// exception of `meanwhile`, which is called with Python's lock now and then, and after the work.
+void run_unlocked(const std::function<void(const volatile bool* interrupt)>& work,
+                  const std::function<void()>& meanwhile = {});
 
 /// As long as it lives, nothing but errors is printed.
 class QuietFor {

@@ -48,9 +48,20 @@ int main_with(const std::vector<std::string>& arguments) {
 
 }  // namespace
 
-void run_unlocked(const std::function<void(const volatile bool* interrupt)>& work) {
+void run_unlocked(const std::function<void(const volatile bool* interrupt)>& work,
+                  const std::function<void()>& meanwhile) {
     volatile bool interrupt = false;
-    std::optional<nb::python_error> signal;
+    std::optional<nb::python_error> raised;
+    const auto look = [&](bool ended) {
+        if (raised) return;
+        try {
+            if (!ended && PyErr_CheckSignals() != 0) throw nb::python_error();
+            if (meanwhile) meanwhile();
+        } catch (nb::python_error& e) {
+            raised.emplace(std::move(e));
+            set_flag(&interrupt);
+        }
+    };
     std::exception_ptr failure;
     {
         const nb::gil_scoped_release unlocked;
@@ -72,17 +83,15 @@ void run_unlocked(const std::function<void(const volatile bool* interrupt)>& wor
             lock.unlock();
             {
                 const nb::gil_scoped_acquire locked;
-                if (!signal && PyErr_CheckSignals() != 0) {
-                    signal.emplace();
-                    set_flag(&interrupt);
-                }
+                look(false);
             }
             lock.lock();
         }
         lock.unlock();
         worker.join();
     }
-    if (signal) throw nb::python_error(std::move(*signal));
+    if (!failure) look(true);
+    if (raised) throw nb::python_error(std::move(*raised));
     if (failure) std::rethrow_exception(failure);
 }
 

@@ -8,6 +8,9 @@
 
 #include <chrono>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "core/outputs.h"
@@ -193,19 +196,43 @@ std::string plan(const std::string& config, bool reduced) {
     return text;
 }
 
+/// The last report of work on another thread, for Python's.
+class LastReport {
+public:
+    void put(const ProgressReport& report) {
+        const std::lock_guard lock(mutex_);
+        last_ = report;
+    }
+    std::optional<ProgressReport> take() {
+        const std::lock_guard lock(mutex_);
+        return std::exchange(last_, std::nullopt);
+    }
+
+private:
+    std::mutex mutex_;
+    std::optional<ProgressReport> last_;
+};
+
+/// `progress`: None, or called with fraction, details and seconds left.
 void experiment(const std::string& config, const std::string& output, const std::string& references, bool resume,
-                bool reduced, bool quiet) {
+                bool reduced, bool quiet, const nb::object& progress) {
     const QuietFor silence(quiet);
+    LastReport reports;
     ExperimentRequest request;
     request.config = config;
     request.output = output;
     request.references = references;
     request.resume = resume;
     request.reduced = reduced;
-    run_unlocked([&](const volatile bool* interrupt) {
-        request.interrupt = interrupt;
-        run_experiment(request, default_hooks());
-    });
+    if (!progress.is_none()) request.on_progress = [&](const ProgressReport& r) { reports.put(r); };
+    run_unlocked(
+        [&](const volatile bool* interrupt) {
+            request.interrupt = interrupt;
+            run_experiment(request, default_hooks());
+        },
+        [&] {
+            if (const auto r = reports.take()) progress(r->fraction, r->details, r->seconds_left);
+        });
 }
 
 }  // namespace
@@ -239,7 +266,8 @@ void bind_renders(nb::module_& m) {
         .def_prop_ro("seconds", &Render::seconds);
     m.def("reference", &reference, "scene"_a, "path"_a, "spp"_a, "settings"_a);
     m.def("plan", &plan, "config"_a, "reduced"_a);
-    m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a);
+    m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a,
+          "progress"_a.none());
 }
 
 }  // namespace ambilux

@@ -233,8 +233,21 @@ size = [16, 12]
 name = "mis"
 integrator = "path"
 ''')
-    results = ambilux.experiment(config, tmp_path / "out")
+    told = []
+    results = ambilux.experiment(config, tmp_path / "out", progress=told.append)
+    assert told and all(0 <= t.fraction <= 1 for t in told) and "box" in told[-1].details
     assert list(results.runs["spp"]) == [1, 2] and len(results.table) >= 1 and "extend" in set(results.stages["stage"])
+    assert len(results.queues) and not len(results.strategies) and set(results.depths["depth"]) > {0}
+    assert results.plot.convergence(x="spp").axes and "convergence" in dir(results.plot) and "save" not in dir(results.plot)
+    with pytest.raises(AttributeError, match="no plot pie; there are ablation"):
+        results.plot.pie()
+
+    def stop(report):
+        raise StopIteration(report.details)
+
+    with pytest.raises(StopIteration):
+        ambilux.experiment(config, tmp_path / "stopped", progress=stop)
+    assert len(ambilux.experiment(config, tmp_path / "stopped", resume=True).runs) == 2
     with pytest.raises(ambilux.SceneError):
         ambilux.experiment(tmp_path / "none.toml", tmp_path / "o2")
 
