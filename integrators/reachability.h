@@ -1,5 +1,5 @@
 // Which paths a set of strategies cannot find, from what a scene is made of: no sample decides it (docs/theory.md,
-// section 6).
+// section 11).
 #pragma once
 
 #include <string>

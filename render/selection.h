@@ -1,4 +1,4 @@
-// bdpt.auto=true: a pilot decides which strategies run and in which variant (docs/theory.md, section 6).
+// bdpt.auto=true: a pilot decides which strategies run and in which variant (docs/theory.md, section 11).
 #pragma once
 
 #include <functional>

@@ -207,7 +207,7 @@ private:
 
     // ---- eye subpaths ----
 
-    /// The pilot's pixels of a block, with all but (18) of the variance (equation 19).
+    /// The pilot's pixels of a block, with all but (30) of the variance (equation 31).
     void eye_block(uint32_t b, PilotSums* pixels, PilotWork& work) const {
         const Sensor& sensor = view_.sensor;
         const uint32_t bx = b % blocks_.x, by = b / blocks_.x;

@@ -1,4 +1,4 @@
-// Second moments of several estimators from one set of paths, before the render (docs/theory.md, section 6).
+// Second moments of several estimators from one set of paths, before the render (docs/theory.md, section 11).
 #pragma once
 
 #include "accel/shared_accels.h"

@@ -1,4 +1,4 @@
-// Sums of the pilot: those of three sets of strategies travel along one subpath (docs/theory.md, section 6).
+// Sums of the pilot: those of three sets of strategies travel along one subpath (docs/theory.md, section 11).
 #pragma once
 
 #include "transport/mis/bidirectional.h"

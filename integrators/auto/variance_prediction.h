@@ -1,4 +1,4 @@
-// What the paths of a pilot tell of the second moments of the estimators that it judges (docs/theory.md, section 6).
+// What the paths of a pilot tell of the second moments of the estimators that it judges (docs/theory.md, section 11).
 #pragma once
 
 #include <algorithm>
@@ -63,7 +63,7 @@ struct SecondMoments {
                             : float(double(c.draws) * double(samples) / double(std::max<size_t>(1, light_vertices)));
     }
 
-    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 18).
+    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 30).
     void add(const PilotEvent& e, PilotSums& sums) const {
         const float weight = e.coverage / e.total();
         bool rare = false;

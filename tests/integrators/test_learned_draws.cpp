@@ -279,7 +279,7 @@ TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {
             const bool teaches = place % teaching_for == 0;
             CHECK((score.entry == 0) == teaches);
             CHECK((score.entry == kNone) == !teaches);
-            // n_l y² / (N² k P_c(v)) of docs/theory.md, section 3, with y = 1 and P_c(v) = 1/n.
+            // n_l y² / (N² κ P_e(v)) of docs/theory.md, section 7, with y = 1 and P_e(v) = 1/n.
             if (teaches) CHECK(double(score.value) == Approx(teaching_for * 1e15 * n * n / (paths * paths * kDraws)));
         }
     }

@@ -1,7 +1,8 @@
 // Draws from a cache of light vertices that follow what light vertices have brought to eye vertices in earlier waves
-// (after Su, Li and Xu 2022, SPCBPT: Subspace-based Bidirectional Path Tracing). Eye vertices lie in cells, light
-// vertices in clusters, and a table tells how a cell draws among clusters. What a draw brings is divided by the
-// probability of its vertex, so that the expectation is that of uniform draws, whatever the table holds.
+// (after Su, Li and Wang 2022, SPCBPT: Subspace-based Probabilistic Connections for Bidirectional Path Tracing). Eye
+// vertices lie in cells, light vertices in clusters, and a table tells how a cell draws among clusters. What a draw
+// brings is divided by the probability of its vertex, so that the expectation is that of uniform draws, whatever the
+// table holds.
 #pragma once
 
 #include "core/atomic.h"
