@@ -96,11 +96,17 @@ std::vector<double> trimmed_means(const std::vector<std::vector<double>>& varian
     return means;
 }
 
-std::vector<double> selection_variances(const Pilot& pilot) {
-    std::vector<double> means = trimmed_means(pilot.variance);
+std::vector<double> selection_variances(const Pilot& pilot, const std::vector<std::string>& excluded) {
+    std::vector<double> variances(pilot.variance.size(), double(kInfinity));
+    std::vector<std::vector<double>> of;
+    for (size_t c = 0; c < variances.size(); ++c)
+        if (excluded[c].empty()) of.push_back(pilot.variance[c]);
+    if (of.empty()) return variances;
+    const std::vector<double> means = trimmed_means(of);
     const double unseen = kUnseen * median(means);
-    for (double& mean : means) mean += unseen;
-    return means;
+    for (size_t c = 0, i = 0; c < variances.size(); ++c)
+        if (excluded[c].empty()) variances[c] = means[i++] + unseen;
+    return variances;
 }
 
 }  // namespace ambilux

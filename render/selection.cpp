@@ -111,13 +111,11 @@ public:
         const Pilot pilot =
             run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, pilot_samples(settings_, cuda_));
         if (head_start_) head_start_->stop();
-        variance_ = selection_variances(pilot);
-        variance_.resize(candidates_.size(), double(kInfinity));
-        for (size_t c = 0; c < candidates_.size(); ++c) {
+        for (size_t c = 0; c < candidates_.size(); ++c)
             if (eye_subpaths(pilot) < candidates_[c].offer.least_subpaths)
                 excluded_[c] = "has too few samples to learn from";
-            if (!excluded_[c].empty()) variance_[c] = double(kInfinity);
-        }
+        variance_ = selection_variances(pilot, excluded_);
+        variance_.resize(candidates_.size(), double(kInfinity));
         for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
         cost_ = work_;
         rank();
@@ -201,8 +199,8 @@ private:
     }
 
     /// Replaces work by time for those that are tried and do not spend a trial on learning, and predicted variances by
-    /// what many more paths than the pilot's have. A variance that is much less than predicted stays: the pilot knows
-    /// of light that single hits bring.
+    /// what many more paths than the pilot's have, in units of the predicted ones. A variance that is much less than
+    /// predicted stays: the pilot knows of light that single hits bring.
     void try_out(const std::vector<size_t>& tried, const Pilot& pilot) {
         if (tried.size() < 2) return;
         std::vector<Measured> of;
@@ -217,14 +215,17 @@ private:
         const size_t clock = learns(candidates_[tried[0]]) ? 1 : 0;
         const double rays_per_second = work_[tried[clock]] / of[clock].seconds, before = variance_[tried[0]];
         const std::vector<double> seen = trimmed_means(variances);
-        double fewest = kInfinity;
+        double fewest = kInfinity, unit = 0;
         for (const Measured& m : of) fewest = std::min(fewest, m.samples * pixels());
+        std::vector<size_t> known;  // places in `tried`
         for (size_t i = 0; i < tried.size(); ++i) {
             const size_t c = tried[i];
             seconds_[c] = of[i].seconds;
             if (!learns(candidates_[c])) cost_[c] = of[i].seconds * rays_per_second;
-            if (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i]) variance_[c] = seen[i];
+            if (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i]) known.push_back(i);
         }
+        for (const size_t i : known) unit += std::log(variance_[tried[i]] / seen[i]) / double(known.size());
+        for (const size_t i : known) variance_[tried[i]] = seen[i] * std::exp(unit);
         // Others stay where they were beside the one that was the best.
         for (size_t c = 0; c < candidates_.size(); ++c)
             if (std::find(tried.begin(), tried.end(), c) == tried.end()) variance_[c] *= variance_[tried[0]] / before;

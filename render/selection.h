@@ -29,8 +29,9 @@ double selection_work(const PilotWork& work, const SelectionCandidate& candidate
 std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance);
 
 /// The variance of one sample that each candidate is selected by: the trimmed mean, and what no pilot sees, which is
-/// the same for all per eye subpath.
-std::vector<double> selection_variances(const Pilot& pilot);
+/// the same for all per eye subpath. `excluded[candidate]`: why it cannot be chosen, or empty. What such a candidate
+/// does not find would pass for little variance: it counts for nothing, and has infinity.
+std::vector<double> selection_variances(const Pilot& pilot, const std::vector<std::string>& excluded);
 
 /// Makes a renderer of given settings, which are not automatic.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RenderSettings&)>;

@@ -15,7 +15,7 @@ struct alignas(16) LightNode {
     Vec3f center;
     float radius;
     Vec3f axis;    ///< unit
-    float energy;  ///< W/sr: sum of what the lights send, each about along its own axis
+    float energy;  ///< 1/sr: sum of the lights' shares of the power, each per solid angle about its own axis
     float cos_o, sin_o;
     float cos_e;    ///< a little less than that of theta_e
     uint32_t next;  ///< the left of its two children, the right one lies behind it; of a leaf kLightLeaf and its number

@@ -1,5 +1,6 @@
 // libs: ambilux_experiments
 // timeout: 180
+// long: tagged
 // seconds: 41
 // The built program under mpirun: images do not depend on the number of ranks, and a rank that is killed costs nothing
 // that was saved.
@@ -201,7 +202,7 @@ std::vector<std::vector<std::string>> sorted_rows(const std::string& folder) {
 
 }  // namespace
 
-TEST_CASE("an experiment over ranks that are killed has the rows of one process, with device and host") {
+TEST_CASE("an experiment over ranks that are killed has the rows of one process, with device and host", "[long]") {
     if (!can_run()) return;
     const test::TempFolder folder;
     const std::string file = folder.write("e.toml", experiment("spp = [4, 400]"));

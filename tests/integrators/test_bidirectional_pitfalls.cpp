@@ -8,6 +8,7 @@
 #include "film/exr_io.h"
 #include "formats/load.h"
 #include "tests/support/bidirectional_images.h"
+#include "tests/support/long_run.h"
 
 using namespace ambilux;
 
@@ -432,11 +433,11 @@ TEST_CASE("B34, G11: surfaces of partial opacity dim every strategy's light alik
     };
     const Image open =
         plane_image(kLight, [](double x, double y) { return rectangle_irradiance(x, y, -0.4, 0.8, -0.3, 0.5, 1.2); });
-    const std::pair<std::string, double> cases[] = {{sheet(0.5, 0.3), 0.7},
-                                                    {sheet(0.5, 0.3) + sheet(0.6, 0.3), 0.49},
-                                                    {sheet(0.05, 0.3), 0.49},
-                                                    {sheet(0.05, 0) + sheet(0.4, 0) + sheet(0.6, 0), 1}};
-    for (const auto& [sheets, passes] : cases) {
+    const std::vector<std::pair<std::string, double>> cases = {{sheet(0.05, 0.3), 0.49},
+                                                               {sheet(0.5, 0.3) + sheet(0.6, 0.3), 0.49},
+                                                               {sheet(0.5, 0.3), 0.7},
+                                                               {sheet(0.05, 0) + sheet(0.4, 0) + sheet(0.6, 0), 1}};
+    for (const auto& [sheets, passes] : first_or_all(1, cases)) {
         const Scene scene = plane_under(lamp(0.6, 0.4, 0.2, 0.1, 1.2) + sheets);
         Image expected = open;
         for (float& v : expected.rgb) v *= float(passes);

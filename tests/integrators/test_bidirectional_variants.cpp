@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "film/splat_sums.h"
 #include "tests/support/bidirectional_images.h"
+#include "tests/support/long_run.h"
 
 using namespace ambilux;
 
@@ -147,7 +148,8 @@ TEST_CASE("lvc has the expectation of paired subpaths, for few draws and many, a
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const auto& [scene, expected] = paired(name);
         for (const uint32_t draws : {1u, 5u}) {
-            for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
+            for (const MisHeuristic heuristic :
+                 first_or_all<MisHeuristic>(1, {MisHeuristic::balance, MisHeuristic::power})) {
                 RenderSettings s = variant_settings(scene, "lvc", 22);
                 s.connections = draws;
                 s.heuristic = heuristic;
@@ -160,7 +162,7 @@ TEST_CASE("lvc has the expectation of paired subpaths, for few draws and many, a
 }
 
 TEST_CASE("Light that is culled before its shadow ray keeps its expectation and saves rays") {
-    for (const char* integrator : {"bdpt", "path"}) {
+    for (const char* integrator : first_or_all<const char*>(1, {"bdpt", "path"})) {
         INFO(integrator);
         const Scene scene = project_scene("cornell", 40, 30);
         RenderSettings s = variant_settings(scene, "wavefront", 41);

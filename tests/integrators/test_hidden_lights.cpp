@@ -4,6 +4,7 @@
 #include "integrators/reachability.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/hidden_light_scene.h"
+#include "tests/support/long_run.h"
 
 using namespace ambilux;
 
@@ -62,7 +63,7 @@ TEST_CASE("it casts no shadow of another light") {
 }
 
 TEST_CASE("hidden lights in a room: path tracing, light tracing and all strategies agree") {
-    for (const bool lamp : {false, true}) {
+    for (const char lamp : first_or_all<char>(1, {true, false})) {
         const Scene scene = scene_from_text(hidden_room(16, 4, lamp));
         INFO(lamp);
         agree(scene, {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"connections+light"}}, 1u << 12, 1u << 10,

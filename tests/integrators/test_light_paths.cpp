@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "integrators/bdpt/shared/policy.h"
 #include "tests/support/bidirectional_images.h"
+#include "tests/support/long_run.h"
 
 using namespace ambilux;
 
@@ -75,14 +76,16 @@ TEST_CASE("light subpaths of a film are counted as they begin, also in the tiles
 
 TEST_CASE("any number of light subpaths gives the image of one for every pixel", "[bidirectional]") {
     // Paired subpaths have less noise than the path tracer, with which they agree (test_bidirectional_images).
-    for (const auto& [name, spp] : {std::pair{"cornell", 512u}, {"lights", 1536u}}) {
+    for (const auto& [name, spp] :
+         first_or_all<std::pair<const char*, uint32_t>>(1, {{"cornell", 512}, {"lights", 1536}})) {
         const Scene scene = project_scene(name, 45, 27);
         const Estimate paired = render_batches(scene, method_settings(scene, kAll, 1001), spp);
-        for (const auto& [light_paths, m] : {std::pair{"0.015625", kLvc},
-                                             {"0.015625", kWithoutConnections},
-                                             {"0.25", kLvcPower},
-                                             {"2.5", kLvc},
-                                             {"2.5", kWithoutConnections}}) {
+        for (const auto& [light_paths, m] :
+             first_or_all<std::pair<const char*, Method>>(2, {{"0.015625", kLvc},
+                                                              {"2.5", kWithoutConnections},
+                                                              {"0.015625", kWithoutConnections},
+                                                              {"0.25", kLvcPower},
+                                                              {"2.5", kLvc}})) {
             INFO(name << " " << m.name << " " << m.variant << " light_paths=" << light_paths);
             const uint32_t samples =
                 light_paths == std::string("0.015625") ? spp * 3 / 2 : spp;  // fewer light subpaths

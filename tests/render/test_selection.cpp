@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_core
 // What bdpt.auto=true makes of a pilot's figures: the work of a candidate and its variance, as arithmetic.
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "render/selection.h"
@@ -84,9 +85,15 @@ TEST_CASE("a hundredth of the blocks, where the best of all candidates is worst,
 TEST_CASE("what no pilot sees counts for all candidates alike: a fifth of the median") {
     Pilot pilot;
     pilot.variance = {{10}, {1}, {4}};
-    const std::vector<double> all = selection_variances(pilot);
+    const std::vector<double> all = selection_variances(pilot, {"", "", ""});
     REQUIRE(all.size() == 3);
     CHECK(all[0] == Approx(10.8));
     CHECK(all[1] == Approx(1.8));
     CHECK(all[2] == Approx(4.8));
+    // One that cannot be chosen tells nothing of the others.
+    const std::vector<double> two = selection_variances(pilot, {"", "cannot find paths", ""});
+    CHECK(two[0] == Approx(12));
+    CHECK(std::isinf(two[1]));
+    CHECK(two[2] == Approx(6));
+    CHECK(std::isinf(selection_variances(pilot, {"a", "b", "c"})[0]));
 }

@@ -57,7 +57,7 @@ struct BidirectionalMis {
     MisHeuristic heuristic;
     uint32_t strategies;   ///< StrategyBits
     float light_subpaths;  ///< per eye subpath of one pixel: of the whole image, over the samples of a pixel
-    float connections;     ///< expected number of times that an eye vertex meets a given light subpath: 1 for pairs
+    float connections;     ///< expected samples of each strategy of connections at an eye vertex: 1 for pairs
 
     AMBILUX_HD bool has(uint32_t bits) const { return strategies & bits; }
     /// Ratio of densities to the power that the heuristic asks for.

@@ -23,8 +23,8 @@ struct LvcOf {
         p.one_connection_per_launch |= p.cache_draws == 1;  // of one draw there is no second
         return p;
     }
-    /// An eye vertex draws k of the M vertices of N subpaths: it meets a given subpath's vertex k N / M times on
-    /// average.
+    /// An eye vertex draws k of the M vertices of N subpaths, each of which has one of a given depth at most: k N / M
+    /// samples of a strategy on average (docs/theory.md, equation 18).
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         if (!p.light_subpaths()) return 0.0;
         const double mean = mean_light_vertices<F>(scene, tracer, p.rules, seed);
