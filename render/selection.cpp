@@ -199,8 +199,8 @@ private:
     }
 
     /// Replaces work by time for those that are tried and do not spend a trial on learning, and predicted variances by
-    /// what many more paths than the pilot's have, in units of the predicted ones. A variance that is much less than
-    /// predicted stays: the pilot knows of light that single hits bring.
+    /// what many more paths than the pilot's have. A variance that is much less than predicted stays, but for the ratio
+    /// of measured to predicted ones: the pilot knows of light that single hits bring.
     void try_out(const std::vector<size_t>& tried, const Pilot& pilot) {
         if (tried.size() < 2) return;
         std::vector<Measured> of;
@@ -215,17 +215,18 @@ private:
         const size_t clock = learns(candidates_[tried[0]]) ? 1 : 0;
         const double rays_per_second = work_[tried[clock]] / of[clock].seconds, before = variance_[tried[0]];
         const std::vector<double> seen = trimmed_means(variances);
-        double fewest = kInfinity, unit = 0;
+        double fewest = kInfinity, unit = 0;  // logarithm of measured over predicted variance
         for (const Measured& m : of) fewest = std::min(fewest, m.samples * pixels());
-        std::vector<size_t> known;  // places in `tried`
+        std::vector<size_t> known, kept;  // places in `tried`
         for (size_t i = 0; i < tried.size(); ++i) {
             const size_t c = tried[i];
             seconds_[c] = of[i].seconds;
             if (!learns(candidates_[c])) cost_[c] = of[i].seconds * rays_per_second;
-            if (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i]) known.push_back(i);
+            (fewest >= kManyPaths * pilot.samples && variance_[c] < kHidden * seen[i] ? known : kept).push_back(i);
         }
-        for (const size_t i : known) unit += std::log(variance_[tried[i]] / seen[i]) / double(known.size());
-        for (const size_t i : known) variance_[tried[i]] = seen[i] * std::exp(unit);
+        for (const size_t i : known) unit += std::log(seen[i] / variance_[tried[i]]) / double(known.size());
+        for (const size_t i : known) variance_[tried[i]] = seen[i];
+        for (const size_t i : kept) variance_[tried[i]] *= std::exp(unit);
         // Others stay where they were beside the one that was the best.
         for (size_t c = 0; c < candidates_.size(); ++c)
             if (std::find(tried.begin(), tried.end(), c) == tried.end()) variance_[c] *= variance_[tried[0]] / before;
