@@ -160,7 +160,7 @@ def experiment(config: str | os.PathLike[str] | Mapping[str, Any], out: str | os
     thread that called; what it raises ends the experiment as an interrupt does."""
     with config_file(config) as path:
         if dry_run:
-            return _core.plan(path, reduced)
+            return _core.plan(path, os.fspath(references), reduced)
         if out is None:
             raise UsageError("an experiment needs a folder for its results, unless dry_run is True")
         _core.experiment(path, os.fspath(out), os.fspath(references), resume, reduced, quiet,

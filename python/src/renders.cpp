@@ -184,9 +184,10 @@ std::pair<Reference, std::string> reference(const SharedScene& scene, const std:
 }
 
 /// What an experiment would do.
-std::string plan(const std::string& config, bool reduced) {
+std::string plan(const std::string& config, const std::string& references, bool reduced) {
     ExperimentRequest request;
     request.config = config;
+    request.references = references;
     request.reduced = reduced;
     std::string text;
     run_unlocked([&](const volatile bool* interrupt) {
@@ -265,7 +266,7 @@ void bind_renders(nb::module_& m) {
         .def_prop_ro("samples", &Render::samples)
         .def_prop_ro("seconds", &Render::seconds);
     m.def("reference", &reference, "scene"_a, "path"_a, "spp"_a, "settings"_a);
-    m.def("plan", &plan, "config"_a, "reduced"_a);
+    m.def("plan", &plan, "config"_a, "references"_a, "reduced"_a);
     m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a,
           "progress"_a.none());
 }

@@ -1,5 +1,6 @@
 """Renders, their arrays, interrupts and threads."""
 
+import hashlib
 import json
 import os
 import signal
@@ -250,6 +251,15 @@ integrator = "path"
     assert len(ambilux.experiment(config, tmp_path / "stopped", resume=True).runs) == 2
     with pytest.raises(ambilux.SceneError):
         ambilux.experiment(tmp_path / "none.toml", tmp_path / "o2")
+
+
+def test_the_references_of_the_demo_come_with_the_project():
+    folder = SCENES / "references"
+    for line in (folder / "SHA256SUMS").read_text().splitlines():
+        digest, name = line.split()
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
+    plan = ambilux.experiment(SCENES.parent / "experiments/demo.toml", references=folder, dry_run=True)
+    assert plan.count(": cached with ") == 2 and ": to make" not in plan
 
 
 def test_the_program_and_its_version():
