@@ -16,7 +16,7 @@ from ambilux.errors import SceneError, UsageError
 
 
 class Results:
-    """The folder of an experiment. Each property is a frame of ambilux.analysis.frames (needs pandas); columns: docs/experiments.md."""
+    """The folder of an experiment. Each property is a frame of ambilux.analysis.frames (needs pandas); columns: docs/analysis.md, docs/experiments.md."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder)

@@ -173,7 +173,7 @@ def csv_columns():
 
 
 def to_csv(lines):
-    """All numbers in full precision, for further work. Columns: docs/experiments.md."""
+    """All numbers in full precision, for further work. Columns: docs/analysis.md."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(csv_columns())
