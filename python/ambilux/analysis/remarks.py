@@ -121,6 +121,16 @@ def clock_remarks(experiment):
             yield (f"{name}: {a[name]:.0f} MHz at {first}, {b[name]:.0f} at {last}{idle}; times of early and late renders may not be comparable")
 
 
+def stated_bias_remarks(lines):
+    """Runs whose method says that it is biased, by what it says."""
+    said = {}
+    for line in lines:
+        if line.stated_bias:
+            said.setdefault(line.stated_bias, {})[line.run] = True
+    for bias, runs in said.items():
+        yield f"{listed(list(runs))}: {bias}, so that errors include this bias and need not fall with slope −1/2"
+
+
 def has_black_reference(experiment, scene):
     try:
         return (path := experiment.reference(scene)) is not None and images.is_black(images.read_exr(path))
@@ -143,11 +153,10 @@ def remarks(experiment, lines):
             have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
             if len(have) < len(every) and (have or not peers.is_left_out(experiment, scene, run)):
                 found.append(f"{scene}, {run}: {len(have)} of {len(every)} checkpoints recorded; figures and table use what is there")
+    found += stated_bias_remarks(lines)
     threshold, quiet = verdicts.bias_threshold(verdicts.family(lines)), {}
     for line in lines:
         place = f"{line.scene}, {line.run}"
-        if line.stated_bias:
-            found.append(f"{place}: {line.stated_bias}, so that errors include this bias and need not fall with slope −1/2")
         noise = summary.reference_noise(experiment, line.scene)
         if line.invalid:
             found.append(f"{place}: {line.invalid} values were NaN, Inf or negative and were dropped")

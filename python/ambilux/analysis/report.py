@@ -121,8 +121,12 @@ def figure(out, name, title, caption):
 
 
 def verdict_table(lines):
-    rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{tables.breakable(run)}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
-            for (scene, run), (slope, bias) in verdicts.verdicts(lines).items()]
+    """A row for each run; runs of a scene of which the same is said share one."""
+    runs = {}
+    for (scene, run), said in verdicts.verdicts(lines).items():
+        runs.setdefault((scene, *said), []).append(run)
+    rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{', '.join(map(tables.breakable, names))}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
+            for (scene, slope, bias), names in runs.items()]
     return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 
 
@@ -144,7 +148,7 @@ def render(experiment, lines, remarks, made, out, full_size=False):
     body += ['<h2 id="convergence">Convergence</h2>', '<div class="plot"></div>',
              '<p class="note">Lines: arithmetic mean over seeds (RMSE: root of the mean of squares); bands: its 95 % interval over seeds, where the data support one. The noise of the reference is subtracted where it is known. '
              f"{html.escape(summary.rows_used(experiment))}</p>",
-             '<h2 id="table">Table</h2>', f'<div class="table">{tables.to_html(experiment, lines)}</div>', tables.marks_html(experiment, lines),
+             '<h2 id="table">Table</h2>', f'<div>{tables.to_html(experiment, lines)}{tables.marks_html(experiment, lines)}</div>',
              f'<details class="note"><summary>How these numbers are made</summary><p>{html.escape(tables.caption(experiment, lines))} '
              "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p></details>",
              f'<div class="wide">{verdict_table(lines)}</div>',

@@ -274,6 +274,7 @@ def to_html(experiment, lines):
 
 
 def marks_html(experiment, lines):
-    """What signs and words of the table mean, to stand right below it."""
+    """What signs and words of the table mean, to stand right below it; those of a column that a narrow window leaves out with that column."""
     found = marks(experiment, lines)
-    return '<dl class="marks">' + "".join(f"<dt>{html.escape(sign)}</dt><dd>{html.escape(text)}</dd>" for sign, text in found) + "</dl>" if found else ""
+    entries = "".join("<dt{0}>{1}</dt><dd{0}>{2}</dd>".format(' class="roomy"' if sign in MARKS else "", html.escape(sign), html.escape(text)) for sign, text in found)
+    return f'<dl class="marks">{entries}</dl>' if found else ""
