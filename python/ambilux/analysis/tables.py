@@ -243,11 +243,6 @@ def leading(experiment):
     return ("scene", "run", "spp" if summary.equal(experiment) == "time" else "time (s)", "relMSE" if experiment.metric == "relmse" else "RMSE", "ratio [95 %]", "time to equal RMSE")
 
 
-def in_lines(cell):
-    """A cell as HTML, in which an interval may begin a line of its own."""
-    return re.sub(r" \[", " <wbr>[", html.escape(minus(cell)))
-
-
 def to_html(experiment, lines):
     """A box that shows all columns, without a script, and the table. Columns of the class more are those that it adds; those of the class roomy are left out of a narrow window, too."""
     leads, last = leading(experiment), ("Mrays/s", "bias |z|")
@@ -259,7 +254,7 @@ def to_html(experiment, lines):
     scene, biased = None, verdicts.biased(lines)
     bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
     for line in lines:
-        row = [in_lines(c) if i > 1 else breakable(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
+        row = [html.escape(minus(c)) if i > 1 else breakable(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is bold.get(line.scene):
             at = shown.index("ratio [95 %]")

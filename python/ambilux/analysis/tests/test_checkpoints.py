@@ -118,6 +118,6 @@ def test_clocks_are_stated_and_remarked(folder, data):
     assert said.startswith("GPU 0: 345 MHz at start, 1980 at end (an idle GPU shows low clocks")
     assert any("Clocks: CPU 2600" in line for line in captions.data_behind(made, ["box"], ["slow"])) and "Clocks: CPU 2600" in report.reference_table(made)
     made.manifest["clocks"] = [clocks("start", 3000), clocks("end", 2000)]
-    assert list(remarks.clock_remarks(made)) == ["CPU: 3000 MHz at start, 2000 at end; times of early and late renders may not compare"]
+    assert list(remarks.clock_remarks(made)) == ["CPU: 3000 MHz at start, 2000 at end; times of early and late renders may not be comparable"]
     made.manifest["clocks"] = [clocks("start", None)]
     assert remarks.clock_text(made) is None and list(remarks.clock_remarks(made)) == []

@@ -18,7 +18,7 @@ def recorded(folder, others, mhz=lambda seed: 3000.0):
 def test_quiet_machines_get_no_remark(tmp_path):
     folder = synthetic.make(tmp_path / "r", scenes=("box",))
     (said,) = fairness.remarks(experiment.load(folder))
-    assert said.startswith("what else ran on the machine was not recorded")
+    assert said.startswith("the load of the machine was not recorded")
     assert list(fairness.remarks(recorded(folder, lambda name: 0.2))) == []
 
 

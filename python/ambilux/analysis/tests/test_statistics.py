@@ -103,5 +103,5 @@ def test_two_sided_p_is_uniform_without_an_effect():
 def test_a_detectable_departure_is_found_as_often_as_said(level, degrees):
     rng, count = np.random.default_rng(5), 20000
     error = np.sqrt(rng.chisquare(degrees, count) / degrees) if math.isfinite(degrees) else np.ones(count)
-    found = (np.abs(rng.normal(size=count) + statistics.detectable(level, degrees)) > student.isf(level / 2, degrees) * error).mean()
+    found = (np.abs(rng.normal(size=count) + st.detectable(level, degrees)) > student.isf(level / 2, degrees) * error).mean()
     assert found == pytest.approx(st.POWER, abs=0.01)  # a standard deviation of 0.002
