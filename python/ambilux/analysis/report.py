@@ -127,7 +127,7 @@ def verdict_table(lines):
         runs.setdefault((scene, *said), []).append(run)
     rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{', '.join(map(tables.breakable, names))}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
             for (scene, slope, bias), names in runs.items()]
-    return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
+    return ('<table class="said verdicts"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 
 
 def render(experiment, lines, remarks, made, out, full_size=False):
