@@ -182,12 +182,11 @@ void add_bench(CLI::App& app, Run& run) {
 
     auto q = std::make_shared<BenchArguments>();
     CLI::App& queues_command = *command.add_subcommand(
-        "queues", "Pushing to queues, compaction, going through them, and ordering a scene's first hits and rays");
+        "queues", "Queues: pushing, compaction, iteration, and sorting of a scene's first hits and rays");
     q->scene.add_to(queues_command);
     queues_command.add_option("--backend", q->backend, "auto, cpu or cuda")->capture_default_str();
     queues_command
-        .add_option("--items", q->items,
-                    "Threads that look, and items that are ordered; 0: as many as suit the backend")
+        .add_option("--items", q->items, "Number of threads, and of sorted items; 0: the default of the backend")
         ->capture_default_str();
     queues_command.add_option("--repetitions", q->repetitions, "Timed runs of each operation; the median counts")
         ->capture_default_str();
@@ -196,7 +195,7 @@ void add_bench(CLI::App& app, Run& run) {
 
     auto f = std::make_shared<BenchArguments>();
     CLI::App& frames_command = *command.add_subcommand(
-        "frames", "Images a second: one sample of every pixel, on a film that was cleared, and its image on the host");
+        "frames", "Images per second: one sample of every pixel on a cleared film, until its image is on the host");
     f->scene.add_to(frames_command);
     f->render.add_to(frames_command, false);
     frames_command.add_option("--frames", f->frames, "Frames that are timed")->capture_default_str();
@@ -209,8 +208,8 @@ void add_bench(CLI::App& app, Run& run) {
     s->render.add_to(stages_command, false);
     stages_command.add_option("--spp", s->spp, "Samples per pixel")->capture_default_str();
     stages_command.add_flag("--unfused", s->unfused,
-                            "Render again with fuse=none, and apportion the time of stages that run others inside of "
-                            "them by what these take there");
+                            "Render again with fuse=none, and split the time of each fused stage in proportion to the "
+                            "times of its parts there (an estimate)");
     stages_command.add_option("--json", s->json, "Write the statistics to a file, or - for standard output");
     stages_command.callback([s, &run] { run = [s] { return stages(*s); }; });
 }

@@ -18,8 +18,8 @@ int devices(const std::string& json) {
 
 void add_devices(CLI::App& app, Run& run) {
     auto json = std::make_shared<std::string>();
-    CLI::App& command = *app.add_subcommand(
-        "devices", "CUDA devices, which kernels they get, the driver, and what is missing where one cannot be used");
+    CLI::App& command =
+        *app.add_subcommand("devices", "CUDA devices, their kernels, the driver, and why a device cannot be used");
     command.add_option("--json", *json, "Write it to a file, or - for standard output");
     command.callback([json, &run] { run = [json] { return devices(*json); }; });
 }

@@ -21,11 +21,12 @@ void add_experiment(CLI::App& app, Run& run) {
     command.add_option("-o,--output", request->output, "Folder for results");
     command.add_option("--references", request->references,
                        "Folder that keeps references between experiments. Default: OUTPUT/references");
-    command.add_flag("--resume", request->resume, "Go on with the experiment that the folder holds");
-    command.add_flag("--reduced", request->reduced,
-                     "Smaller, as the section [reduced] of the configuration says: for a machine without a GPU");
+    command.add_flag("--resume", request->resume, "Continue the experiment in the folder");
+    command.add_flag(
+        "--reduced", request->reduced,
+        "Sizes, seeds and budgets of the section [reduced] of the configuration: for a machine without a GPU");
     command.add_flag("--shared-devices", request->shared_devices,
-                     "With several ranks: let them share devices or cores though budgets are in seconds");
+                     "Let several ranks share devices or cores even though budgets are in seconds");
     command.add_flag("--dry-run", *dry,
                      "Print what would be done, with an estimate of time and memory, and write nothing");
     command.callback([request, dry, &run] {

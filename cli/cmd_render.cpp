@@ -340,28 +340,31 @@ void add_render(CLI::App& app, Run& run) {
         ->type_name("DIR");
     command
         .add_option("--aov", o->aovs,
-                    "Layers that the image gets besides: " + fmt::format("{}", fmt::join(known_aovs(), ", ")))
+                    "Additional layers of the image: " + fmt::format("{}", fmt::join(known_aovs(), ", ")))
         ->delimiter(',')
         ->type_name("NAME,...");
     command.add_option("--outliers", o->outliers,
-                       "List the N pixels whose largest sample exceeds the mean of their others most, with commands "
-                       "that replay them; renders one sample at a time");
+                       "List N pixels by the largest difference between one sample and the mean of the pixel's other "
+                       "samples, with commands that replay them; renders one sample at a time");
     command.add_option("--tev", o->tev, "Show the image so far in a running tev, twice a second")
         ->type_name("HOST:PORT");
     command
         .add_option("--devices", o->devices,
-                    "Devices that share the render: numbers of CUDA devices, or cpu; of each rank with mpirun")
+                    "Devices that share the render: numbers of CUDA devices, or cpu; with mpirun, of each rank")
         ->delimiter(',')
         ->type_name("N,...");
-    command.add_option("--range-size", o->range_size,
-                       "Samples that a device renders before it hands its film over. The image does not depend on who "
-                       "renders which range");
+    command.add_option(
+        "--range-size", o->range_size,
+        "Samples per pixel that a device renders before it hands over its film (a range). The image does "
+        "not depend on which device renders a range");
     command.add_option("--block-films", o->block_films,
-                       "Films that a rank adds up before the first one gets them; 1: the first one gets each. Default: "
-                       "1 below 16 ranks, else the root of their number. The image does not depend on it");
-    command.add_option("--checkpoint", o->checkpoint,
-                       "Seconds between two states of the render, OUTPUT.state. Default with several devices: 60");
-    command.add_flag("--resume", o->resume, "Go on from OUTPUT.state, with any number of devices and ranks");
+                       "Films that a rank adds up before it sends their sum to the first rank; 1: the first rank gets "
+                       "each film. Default: 1 below 16 ranks, else about the root of their number. The image does not "
+                       "depend on it");
+    command.add_option(
+        "--checkpoint", o->checkpoint,
+        "Seconds between two saved states of the render, OUTPUT.state. Default with several devices: 60");
+    command.add_flag("--resume", o->resume, "Continue from OUTPUT.state, with any number of devices and ranks");
     command.add_flag(
         "--strict", o->strict,
         "Fail (exit code 4) if invalid values or lost queue items were counted, and (3) if the scene has warnings");

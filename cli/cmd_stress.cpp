@@ -67,20 +67,18 @@ void add_stress(CLI::App& app, Run& run) {
     command.add_option("-o,--output", o->request.output, "Folder for stress.csv");
     command.add_flag("--quick", o->request.quick,
                      "Fewer cells, methods and samples: at most three minutes on two cores");
-    command.add_option("--family", o->request.families, "Only this family; may be given again")
-        ->allow_extra_args(false);
-    command.add_option("--method", o->request.methods, "Only this method; may be given again")->allow_extra_args(false);
+    command.add_option("--family", o->request.families, "Only this family; may be repeated")->allow_extra_args(false);
+    command.add_option("--method", o->request.methods, "Only this method; may be repeated")->allow_extra_args(false);
     command.add_option("--backend", o->request.backend, "auto, cpu or cuda")->capture_default_str();
     command.add_option("--seed", o->request.seed, "Seed of all renders")->capture_default_str();
-    command.add_option("--time", o->request.seconds,
-                       "Seconds for the whole sweep: samples are shared out so that it ends by then");
-    command.add_flag("--resume", o->request.resume, "Go on with the sweep that the folder holds");
+    command.add_option("--time", o->request.seconds, "Seconds for the whole sweep, which are divided among its rows");
+    command.add_flag("--resume", o->request.resume, "Continue the sweep in the folder");
     command.add_flag("--list", o->list, "Print the families and what they sweep");
     command.add_option("--export", o->export_to,
                        "Write the scenes, in Mitsuba's format, and expected.csv into this folder, and render nothing");
     command.add_option(
         "--judge", o->judge,
-        "Judge what another renderer measured on the exported scenes (docs/stress.md), and render nothing");
+        "Test what another renderer measured on the exported scenes (docs/stress.md), and render nothing");
     command.callback([o, &run] { run = [o] { return stress_command(*o); }; });
 }
 

@@ -91,12 +91,12 @@ void add_trace(CLI::App& app, Run& run) {
     command.add_option("--pixel", o->pixel, "Pixel X,Y of the image, from 0,0 at the top left");
     command.add_option("--sample", o->sample, "Sample of the pixel, from 0")->required();
     command.add_option("--light-subpath", o->light_subpath,
-                       "Light subpath of the sample by its number: shown too, or, without --pixel, alone");
+                       "Number of a light subpath of the sample, to show too, or, without --pixel, alone");
     command.add_option("--strategy", o->strategy,
                        "Show contributions of this strategy only, such as s1t3, or s2+t3 for merges");
     command.add_flag("--compare", o->compare,
-                     "Render the sample too, with --backend cuda on the device, and say from how many segments on it "
-                     "differs from the replay");
+                     "Render the sample as well (with --backend cuda on the device), and print the number of segments "
+                     "from which on it differs from the replay");
     command.add_option("--json", o->json, "Write the replay to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return trace(*o); }; });
 }

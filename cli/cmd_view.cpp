@@ -50,10 +50,9 @@ void add_view(CLI::App& app, Run& run) {
     o->scene.add_to(command);
     o->render.add_to(command, false);
     command.add_option("--reference", o->reference,
-                       "EXR file: the error against it is shown while the camera is the file's");
+                       "Reference (EXR): the error is shown while the camera is that of the scene file");
     command.add_option("--port", o->port, "Port of the page; 0: a free one")->capture_default_str();
-    command
-        .add_option("--host", o->host, "Address that it listens at; with another one than this, others can look too")
+    command.add_option("--host", o->host, "Address to listen on; any other than this lets other machines connect")
         ->capture_default_str();
     command.callback([o, &run] { run = [o] { return view(*o); }; });
 }

@@ -75,9 +75,10 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
     bool differs = false;
     for (int c = 0; c < 3; ++c) differs |= std::abs(o.replayed[c] - p.value[c]) > 1e-3 * std::abs(p.value[c]) + 1e-9;
     if (differs)
-        text += fmt::format(
-            "  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1], o.replayed[2],
-            o.complete ? ": paths parted; trace with --compare says where" : ", without connections from the cache");
+        text += fmt::format("  the replay on the CPU gives ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1],
+                            o.replayed[2],
+                            o.complete ? ": the paths differ; trace with --compare shows where"
+                                       : ", without connections from the cache");
     text += fmt::format("  {}\n", command);
     list.push_back(outlier_json(o));
     list.back()["command"] = command;

@@ -35,13 +35,13 @@ void SceneOptions::add_to(CLI::App& command) {
         ->required();
     command.add_option("--size", size, "Film size instead of the scene's")->type_name("WxH");
     command.add_flag("--lenient", lenient,
-                     "Replace what is not known and list each substitution, instead of refusing the scene");
+                     "Replace unknown elements and list each substitution, instead of refusing the scene");
     command.add_option("-D,--define", parameters, "Value of a $parameter of the scene")
         ->allow_extra_args(false)
         ->type_name("NAME=VALUE");
     command
         .add_option("--param", edits,
-                    "Another value of a parameter of the scene, by the name of its object: lamp.radiance=2 "
+                    "Set a parameter of the loaded scene, by the name of its object: lamp.radiance=2 "
                     "(docs/scenes.md)")
         ->allow_extra_args(false)
         ->type_name("NAME=VALUE");
@@ -51,7 +51,7 @@ void SceneOptions::add_to(CLI::App& command) {
         ->capture_default_str();
     command
         .add_option("--limits", limits,
-                    "What the scene may ask for at most; defaults are " + limits_text({}) + " (docs/limits.md)")
+                    "Limits on what the scene may request; defaults are " + limits_text({}) + " (docs/limits.md)")
         ->allow_extra_args(false)
         ->type_name("KEY=N");
 }
@@ -101,7 +101,8 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
     command.add_flag("--deterministic", deterministic, find_general_setting("deterministic")->what.help);
     command
-        .add_option("--set", set, "Any setting of `ambilux help settings`, such as estimator=nee; it has the last word")
+        .add_option("--set", set,
+                    "Any setting of `ambilux help settings`, such as estimator=nee; overrides other options")
         ->allow_extra_args(false)
         ->type_name("KEY=VALUE");
 }

@@ -70,7 +70,7 @@ int run_program(int argc, const char* const* argv) {
     app.fallthrough();
     app.failure_message(wrong_use);
     bool quiet = false;
-    app.add_flag("--quiet", quiet, "No progress and no messages but errors");
+    app.add_flag("--quiet", quiet, "Print errors only, no progress");
     Run run;
     add_render(app, run);
     add_info(app, run);

@@ -182,7 +182,7 @@ private:
         if (!config_.seconds.empty())
             text += fmt::format("  {} at {} s\n", config_.seconds.size(), fmt::join(config_.seconds, ", "));
         if (config_.repeats)
-            text += fmt::format("\na render that others disturb is made again, up to {} time{}\n", config_.repeats,
+            text += fmt::format("\na disturbed render is repeated, at most {} time{}\n", config_.repeats,
                                 config_.repeats > 1 ? "s" : "");
         if (!config_.ablation_default.empty())
             text += "\nablation: every run is compared with " + config_.ablation_default + "\n";

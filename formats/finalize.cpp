@@ -253,7 +253,7 @@ void fill_emitters(Scene& scene, LightPicking picking, const Scene* before) {
         infinite.push_back(is_infinite(e.type));
     }
     if (*std::max_element(powers.begin(), powers.end()) == 0)
-        scene.notes.push_back(scene.path + ": none of its lights shines: its image is black");
+        scene.notes.push_back(scene.path + ": all its lights have zero radiance: its image is black");
     const std::vector<double> weights = picking_weights(std::move(powers), infinite, picking);
     scene.emitter_cdf =
         checked_pick_table(scene, weights, "emitters", "make one mesh light of emitters with the same radiance");

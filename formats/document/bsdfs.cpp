@@ -207,7 +207,7 @@ struct MaterialBuilder {
             }
         const ParamFloat of_seen = baked_number(builder, in, {a, b, weight}, of_second);
         if (of_seen.texture >= 0)
-            builder.note(in.where(), "of masks inside of a blend, weights and opacities are made texel by texel");
+            builder.note(in.where(), "weights and opacities of masks inside of a blend are combined texel by texel");
         return blend(first, second, of_seen, mask);
     }
 

@@ -34,7 +34,7 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
         }
         in.ignore({"sample_visible"});
         builder.note(in.where(),
-                     "what lies below a roughcoating is as bright as below a smooth one; Mitsuba 0.6 has it darker by "
+                     "the base below a roughcoating is as bright as below a smooth one; Mitsuba 0.6 darkens it by "
                      "cos/cos' of the viewing direction before and behind the boundary");
     }
     if (builder.validate_only) return place;

@@ -136,8 +136,8 @@ void add_instances(const Builder& builder, const std::vector<GroupJobs>& groups,
     }
     if (scene.instances.empty()) return;
     scene.notes.push_back(std::to_string(scene.instances.size()) + " instances share " + std::to_string(shared) +
-                          " triangles, which would be " + std::to_string(copies) +
-                          " as copies (--limits copies=N copies groups of fewer)");
+                          " triangles; as copies they would be " + std::to_string(copies) +
+                          " (--limits copies=N copies groups of fewer)");
 }
 
 }  // namespace ambilux::document

@@ -82,7 +82,8 @@ void build_integrator(Builder& builder, const Object& object) {
         hint.type = type == "ptracer" ? "light" : (type == "bdpt" ? "bdpt" : "path");
         read_lengths(in, hint);
         if (full)
-            builder.note(object.where, "integrator '" + type + "' has the image of the path tracer, which is used");
+            builder.note(object.where,
+                         "integrator '" + type + "' converges to the image of the path tracer, which is used");
     } else {
         builder.refuse(object.where, "integrator type '" + type + "' is not supported", "path is used");
         hint.type = "path";

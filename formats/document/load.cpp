@@ -99,7 +99,7 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
         while (root.take(tag)) {}
     // Exporters write media that nothing is made of; what refers to one is refused there.
     while (const Object* medium = root.take("medium"))
-        builder.note(medium->where, "media are not supported; this one is left out, nothing that loads refers to it");
+        builder.note(medium->where, "media are not supported; this one is left out, since nothing refers to it");
     const std::set<const Object*> of_shapes = referenced_emitters(document);
     while (const Object* emitter = root.take("emitter"))
         if (!of_shapes.contains(emitter)) build_emitter(builder, *emitter);
@@ -109,8 +109,9 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     if (integrator && document.scene->version >= 2 && scene.integrator.hide_emitters &&
         std::any_of(scene.emitters.begin(), scene.emitters.end(),
                     [](const Emitter& e) { return e.type == EmitterType::area; }))
-        builder.note(integrator->where,
-                     "hide_emitters hides the light of lamps: their surfaces are seen, which rays pass in Mitsuba 3.9");
+        builder.note(
+            integrator->where,
+            "hide_emitters hides the light of lamps; their surfaces stay visible, in Mitsuba 3.9 rays pass them");
     if (!sensor) build_default_sensor(builder, *document.scene);
     validate_unused(builder);
     scene.content_hash = content_hash(builder);

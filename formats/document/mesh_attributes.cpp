@@ -101,9 +101,9 @@ Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source
     const bool older = in.object().version < 2, srgb = older && is_ply && in.boolean("srgb", true);
     for (MeshAttribute& a : mesh.attributes) {
         if (a.most > 1 && (!older || a.property == "r"))
-            builder.note({source.path, 0}, "colours in whole numbers are parts of the largest, " +
-                                               std::to_string(int(a.most)) + (srgb ? ", and sRGB" : ", and linear") +
-                                               "; Mitsuba takes these as they are");
+            builder.note({source.path, 0}, "integer colours are divided by " + std::to_string(int(a.most)) +
+                                               (srgb ? " and read as sRGB" : " and read as linear") +
+                                               "; Mitsuba reads them undivided");
         if (srgb && a.name == "vertex_color")
             for (Rgb& value : a.values)
                 for (int c = 0; c < 3; ++c) value[c] = float(srgb_to_linear(value[c]));

@@ -39,8 +39,8 @@ std::string Builder::file(const std::string& name, const Where& where) {
     const fs::path beside = fs::path(where.file).parent_path() / name;
     if (where.file != scene.path && beside != path && fs::exists(beside, ignored) &&
         !fs::equivalent(beside, path, ignored))
-        note(where,
-             fmt::format("'{}' is '{}', as in Mitsuba, and not the file of that name beside this one", name, path));
+        note(where, fmt::format("'{}' is read from '{}', as in Mitsuba, not from the file of that name beside this one",
+                                name, path));
     return path;
 }
 

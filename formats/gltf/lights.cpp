@@ -48,7 +48,7 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
     if (value == splat(0)) return context.note("lights of intensity 0 are left out");
     context.emits = true;
     if (light.range > 0)
-        context.note("the range of lights is left out: their light falls off with the squared distance");
+        context.note("the range of lights is ignored: their light falls off with the squared distance");
     Object& out = add_to_scene(context.document, "emitter", light.type, context.where);
     if (light.type == "directional") {
         set_vector(out, "direction", column(to_world, 2) * -1);

@@ -265,7 +265,7 @@ private:
             c_, primitive, surface(c_, primitive.material, {{}, false, use.tangents}).tex_coord, pose, {}, what);
         if (colors.values.size() != whole.positions.size())
             c_.fail(what + ", COLOR_0: its size is not that of the primitive");
-        c_.note("of colours of vertices on surfaces with textures the mean of each triangle counts, in steps");
+        c_.note("colours of vertices beside textures are averaged over each triangle, in steps");
         for (ColoredPart& part : parts_by_color(whole, colors))
             add_part(parts, name + ", colour " + std::to_string(parts.size()), primitive,
                      {part.colors, false, use.tangents}, in_mirror, [&](int) { return std::move(part.mesh); });
@@ -278,7 +278,7 @@ private:
         const Context::Surface front = surface(c_, primitive.material, use);
         Mesh mesh = make(front.tex_coord), mirrored;
         if (front.has_textures && mesh.uvs.empty()) {
-            c_.note("textures of a mesh without texture coordinates are of one colour");
+            c_.note("textures have one colour on a mesh without texture coordinates");
             mesh.uvs.assign(mesh.positions.size(), Vec2f{0, 0});
         }
         if (front.has_normals) mirrored = take_mirrored(mesh, in_mirror);

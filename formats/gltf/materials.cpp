@@ -43,15 +43,15 @@ public:
             Object& both = object("bsdf", "twosided");
             add_child(both, *bsdf);
             bsdf = &both;
-            if (!m_.doubleSided) c_.note("surfaces that glTF shows from one side are seen from both");
+            if (!m_.doubleSided) c_.note("surfaces that glTF shows from one side are visible from both");
         }
         if (m_.occlusionTexture.index >= 0) c_.note("occlusion textures are left out: light is traced");
         if (m_.alphaMode != "OPAQUE") bsdf = &with_opacity(*bsdf);
         const bool double_sided = m_.doubleSided && bsdf->type == "twosided";
         const Object* light = emitter();
         if (light)
-            c_.note(double_sided ? "two-sided surfaces that shine are two, a hundred-thousandth of their extent apart"
-                                 : "surfaces that shine do so on their front side");
+            c_.note(double_sided ? "two-sided emissive surfaces become two, a hundred-thousandth of their extent apart"
+                                 : "emissive surfaces emit on their front side only");
         return {bsdf, light, textures_.tex_coord(), double_sided, normal_texture_.index >= 0, textures_.any()};
     }
 
@@ -112,7 +112,7 @@ private:
     Rgb mean_of(const tinygltf::Value* of, const char* name, bool raw) {
         const Used texture = textures_.with_image(used(of, name));
         if (texture.index < 0) return splat(1);
-        c_.note(std::string("of ") + name + " the mean counts");
+        c_.note(std::string(name) + " counts by its mean");
         return textures_.mean(texture, raw);
     }
     Rgb color_in(const tinygltf::Value& of, const char* name, Rgb fallback) {
@@ -156,7 +156,7 @@ private:
         if (!(strength > 0)) return false;
         if (given->Has("anisotropyTexture")) c_.note("anisotropyTexture is left out: the strength counts");
         if (number(given, "anisotropyRotation", 0) != 0)
-            c_.note("anisotropy lies along the texture coordinates, whatever its rotation is");
+            c_.note("anisotropy follows the texture coordinates; its rotation is ignored");
         const double mean = rough_texture_.index >= 0 ? double(textures_.mean(rough_texture_, true).y) : 1,
                      rough = rough_ * mean, across = std::max(rough * rough, 1e-3),
                      along = across + (1 - across) * strength * strength, anisotropic = (1 - across / along) / 0.9;
@@ -180,7 +180,7 @@ private:
                              number(coat, "clearcoatFactor", 0) * double(mean_of(coat, "clearcoatTexture", true).x),
                          rough = number(coat, "clearcoatRoughnessFactor", 0) *
                                  double(mean_of(coat, "clearcoatRoughnessTexture", true).y);
-            if (coat->Has("clearcoatNormalTexture")) c_.note("clearcoats have the normals of what they lie on");
+            if (coat->Has("clearcoatNormalTexture")) c_.note("clearcoats have the normals of the base");
             set_number(out, "clearcoat", std::clamp(factor, 0.0, 1.0));
             set_number(out, "clearcoat_gloss", std::clamp((0.1 - rough * rough) / 0.099, 0.0, 1.0));
             c_.note("clearcoats are approximated by those of the principled BSDF");
@@ -193,7 +193,7 @@ private:
         const double distance = number(&volume, "attenuationDistance", INFINITY);
         const Rgb color = color_in(volume, "attenuationColor", splat(1));
         if (!(distance > 0 && distance < 1e30) || color == splat(1)) return splat(1);
-        c_.note("attenuation in a volume goes by the thickness that the file gives, half of it at each boundary");
+        c_.note("attenuation in a volume uses the thickness of the file, half of it at each boundary");
         const double passed =
             number(&volume, "thicknessFactor", 0) * double(mean_of(&volume, "thicknessTexture", true).y) / distance / 2;
         Rgb out;
@@ -216,7 +216,7 @@ private:
         const double weight = number(given, "diffuseTransmissionFactor", 0);
         if (!(weight > 0)) return nullptr;
         transmits_ = true;
-        c_.note("what KHR_materials_diffuse_transmission lets pass is taken from the highlight, too");
+        c_.note("KHR_materials_diffuse_transmission also weakens the highlight");
         Object &blend = object("bsdf", "blendbsdf"), &through = object("bsdf", "difftrans");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0),
                               textures_.with_image(used(given, "diffuseTransmissionTexture")), "a");
@@ -243,7 +243,7 @@ private:
         const double alpha = rough_ * rough_;
         const bool smooth = !thick || alpha < 1e-3 || ior() == 1;
         if (!thick && alpha >= 1e-3) c_.note("thin panes that transmit are smooth");
-        if (!smooth && rough_texture_.index >= 0) c_.note("of rough glass the roughness is a number, no texture");
+        if (!smooth && rough_texture_.index >= 0) c_.note("rough glass has one roughness, without a texture");
         Object& glass = object("bsdf", !thick ? "thindielectric" : smooth ? "dielectric" : "roughdielectric");
         set_number(glass, "int_ior", ior());
         set_number(glass, "ext_ior", 1);
@@ -256,7 +256,7 @@ private:
             set_number(glass, "alpha", alpha);
         }
         if (weight >= 1 && texture.index < 0 && metallic_ == 0) return glass;
-        if (metallic_ > 0) c_.note("materials that transmit and are metallic are a blend by their transmission alone");
+        if (metallic_ > 0) c_.note("metallic materials that transmit are blended by their transmission alone");
         Object& blend = object("bsdf", "blendbsdf");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0), texture, "r");
         return blend_of(blend, opaque, glass);

@@ -96,7 +96,7 @@ void note_unused(const Imf::ChannelList& channels, const Layer& layer, std::vect
         if (it.name() != layer.alpha &&
             std::find(layer.channels.begin(), layer.channels.end(), it.name()) == layer.channels.end())
             unused.insert(it.name(), it.channel());
-    if (unused.begin() != unused.end()) notes.push_back("channels that are not used: " + all_names(unused));
+    if (unused.begin() != unused.end()) notes.push_back("unused channels: " + all_names(unused));
 }
 
 void note_header(const Imf::Header& header, std::vector<std::string>& notes) {
@@ -106,14 +106,14 @@ void note_header(const Imf::Header& header, std::vector<std::string>& notes) {
     };
     if (header.dataWindow() != header.displayWindow())
         notes.push_back("the texels are those of its data window, " + text(header.dataWindow()) +
-                        ", whatever its display window is: " + text(header.displayWindow()));
+                        "; its display window is another: " + text(header.displayWindow()));
     if (Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE)
         notes.emplace_back("it says that it is an environment on the faces of a cube, and is taken as it lies");
     for (const char* name : {"colorInteropID", "oiio:ColorSpace"}) {
         const auto* space = header.findTypedAttribute<Imf::StringAttribute>(name);
         const std::string value = space && !Imf::hasChromaticities(header) ? space->value() : "";
         if (!value.empty() && !value.starts_with("lin_rec709") && value != "Linear" && value != "scene_linear")
-            notes.push_back("colours are taken as linear Rec.709, whatever its " + std::string(name) + " is: " + value);
+            notes.push_back("colours are read as linear Rec.709; its " + std::string(name) + " is ignored: " + value);
     }
 }
 

@@ -41,14 +41,13 @@ struct HdrHeader {
             if (sscanf(line.c_str(), "COLORCORR=%lf %lf %lf", by, by + 1, by + 2) != 3) by[0] = 0;
         } else if (line.starts_with("PRIMARIES=") ||
                    (line.starts_with("GAMMA=") && std::strtod(&line[6], nullptr) != 1)) {
-            notes.push_back("colours are taken as linear Rec.709, whatever its header has: " + line);
+            notes.push_back("colours are read as linear Rec.709; ignored in its header: " + line);
         }
         for (size_t c = 0; c < 3; ++c) {
             if (!(by[c] > 0 && by[c] < 1e30)) budget.fail("cannot read HDR image: '" + line + "' is not positive");
             applied[c] *= by[c];
         }
-        if (by[0] != 1 || by[1] != 1 || by[2] != 1)
-            notes.push_back("values are divided by what its header has: " + line);
+        if (by[0] != 1 || by[1] != 1 || by[2] != 1) notes.push_back("values are divided as its header says: " + line);
     }
 };
 

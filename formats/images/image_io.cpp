@@ -46,8 +46,7 @@ void note_orientation(std::string_view exif, Texels& texels) {
     const size_t list = number(4, 4), count = number(list, 2);
     for (size_t at = list + 2; at < list + 2 + 12 * count; at += 12)
         if (const uint32_t value = number(at + 8, 2); number(at, 2) == 0x112 && value > 1 && value <= 8)
-            return texels.notes.push_back("rows are taken as they lie; its EXIF orientation is left out: " +
-                                          std::to_string(value));
+            return texels.notes.push_back("its EXIF orientation is ignored: " + std::to_string(value));
 }
 
 Texels read_image(const std::string& path, std::string_view bytes, const Limits& limits) {

@@ -94,9 +94,9 @@ void note_chunks(PngReader& reader, Texels& texels) {
     if (is_srgb) return;
     if (profile) return note_profile({reinterpret_cast<const char*>(profile), profile_size}, texels);
     if (gamma > 0 && std::fabs(gamma - 1 / 2.2) > 0.02)
-        texels.notes.push_back("the gamma of its gAMA is left out: " + std::to_string(gamma));
+        texels.notes.push_back("the gamma of its gAMA is ignored: " + std::to_string(gamma));
     if (has_primaries && !std::equal(xy, xy + 8, kSrgb, [](double a, double b) { return std::fabs(a - b) <= 0.01; }))
-        texels.notes.emplace_back("its cHRM, other primaries than sRGB's, are left out");
+        texels.notes.emplace_back("its cHRM, primaries other than sRGB's, is ignored");
 }
 
 }  // namespace

@@ -135,7 +135,8 @@ void check_mesh(const std::string& path, Mesh& mesh) {
     for (Vec3f& n : mesh.normals)
         if (!is_finite(n)) n = {0, 0, 0}, ++bad_normals;
     if (bad_normals > 0)
-        mesh.notes.push_back("normals that are not finite count as none: " + std::to_string(bad_normals));
+        mesh.notes.push_back("normals that are not finite are replaced by the triangle's: " +
+                             std::to_string(bad_normals));
     for (size_t i = 0; i < mesh.uvs.size(); ++i)
         if (!is_finite(Vec3f{mesh.uvs[i].x, mesh.uvs[i].y, 0}))
             fail("texture coordinate of vertex " + std::to_string(i) + " is not finite");

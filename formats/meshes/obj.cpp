@@ -164,7 +164,7 @@ void add_colors(const ObjReader& in, const std::vector<Corner>& corners, Mesh& m
 void note_absent(const ObjReader& in, uint64_t line, bool has_some, const char* what, Mesh& mesh) {
     if (line == 0) return;
     if (has_some) throw input_error(in.path, line, std::string(what) + " are named before the first of them");
-    mesh.notes.push_back(std::string("faces name ") + what + ", and the obj file has none");
+    mesh.notes.push_back(std::string("faces have indices of ") + what + ", which the obj file lacks");
 }
 
 void add_notes(const ObjReader& in, Mesh& mesh) {
@@ -175,7 +175,7 @@ void add_notes(const ObjReader& in, Mesh& mesh) {
     if (in.unused.empty()) return;
     std::string list;
     for (const std::string& what : in.unused) list += (list.empty() ? "" : ", ") + what;
-    mesh.notes.push_back("the obj file has what is not used: " + list);
+    mesh.notes.push_back("the obj file has unused data: " + list);
 }
 
 }  // namespace

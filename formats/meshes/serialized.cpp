@@ -145,8 +145,7 @@ Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_
         for (size_t i = 0; i < vertices; ++i)
             mesh.uvs[i] = {values[2 * i], flip_v ? 1 - values[2 * i + 1] : values[2 * i + 1]};
     }
-    if (flags & kColors)
-        vectors(), mesh.notes.push_back("the serialized file has what is not used: colours of vertices");
+    if (flags & kColors) vectors(), mesh.notes.push_back("the serialized file has unused data: colours of vertices");
     mesh.faces = in.values<std::array<uint32_t, 3>>(triangles);
     check_mesh(path, mesh);
     return mesh;

@@ -36,7 +36,7 @@ std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in) {
         fail(in.where_of("basis"), "basis '" + basis + "' is not known: bezier, bspline");
     if (type == "flat")
         scene.report.note(
-            in.where, "flat curves, which face every ray, are tubes: they look as wide, but their normals go round");
+            in.where, "flat curves, which face every ray, are tubes of the same visible width with normals all around");
     in.ignore({"N", "splitdepth"});  // N is for ribbons
     const int64_t degree = in.integer("degree", 3);
     if (degree != 2 && degree != 3) fail(in.where_of("degree"), "the degree of a curve is 2 or 3");

@@ -75,7 +75,7 @@ void add_projection(SceneMaker& scene, const Described& light) {
                           float(cosine_at((x + 0.5) / (w * fine), (y + 0.5) / (h * fine)));
             for (int i = 0; i < 3; ++i) image.floats[4 * (size_t(y) * size_t(w * fine) + size_t(x)) + size_t(i)] = c[i];
         }
-    scene.report.note(in.where, "projection lights are projectors with a finer image, which has their falloff in it");
+    scene.report.note(in.where, "projection lights are projectors, whose finer image includes the falloff");
 }
 
 void add_goniometric(SceneMaker& scene, const Described& light) {
@@ -112,7 +112,7 @@ void add_goniometric(SceneMaker& scene, const Described& light) {
         for (size_t i = 0; i < values.size(); ++i)
             for (int c = 0; c < 3; ++c) image.floats[4 * i + size_t(c)] = intensity[c] * values[i];
     }
-    scene.report.note(in.where, "goniometric lights are six projectors, whose images have their intensity");
+    scene.report.note(in.where, "goniometric lights are six projectors, whose images include the intensity");
 }
 
 }  // namespace ambilux::pbrt

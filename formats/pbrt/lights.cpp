@@ -89,8 +89,8 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
     if (in.find("portal"))
         scene.report.note(in.where_of("portal"),
-                          "portals are left out: light is not looked for behind them alone, and what would come "
-                          "another way comes too, which makes no difference where walls enclose the rest");
+                          "portals are ignored: light that does not pass them counts too, which makes no difference "
+                          "where walls enclose the rest");
     const std::string name = in.text("filename", "");
     const Emission e = emission(scene, light, "L");
     if (name.empty()) {
@@ -178,7 +178,8 @@ const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMa
     const Rgb radiance =
         e.scaled(factor) * (alpha.is_constant() ? min(max(alpha.color, splat(0)), splat(1)) : splat(1));
     if (!alpha.is_constant() && !masked)
-        scene.report.note(in.where, "a light with an image, or of solid alpha, shines where its alpha is 0 too");
+        scene.report.note(in.where,
+                          "a light with an image, or with a solid texture as alpha, also emits where alpha is 0");
     if (masked) {
         Texture texture = alpha;
         if (alpha.kind == Texture::Kind::checkerboard) texture = cells(alpha);

@@ -116,7 +116,7 @@ private:
         set_text(object, "distribution", "ggx");
         const auto alpha = [&r](double x) { return r.alpha(x); };
         scene_.report.note(in_.where,
-                           "rough surfaces have masking and shadowing uncorrelated, as in Mitsuba; pbrt "
+                           "masking and shadowing are uncorrelated, as in Mitsuba; pbrt "
                            "correlates them by height");
         if (isotropic) {
             const double u = alpha(textures().mean(r.u)), v = alpha(textures().mean(r.v));
@@ -204,7 +204,7 @@ private:
         if (colored && colored->is_constant()) return metal_of(colored->color);
         is_textured = colored.has_value();
         if (colored) {
-            scene_.report.note(in_.where, "a metal of a textured reflectance has it at all angles");
+            scene_.report.note(in_.where, "a textured reflectance of a metal holds at all angles");
             textures().set_color(object, "specular_reflectance", *colored, uv_);
             return {splat(0), splat(1)};
         }

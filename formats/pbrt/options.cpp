@@ -159,7 +159,7 @@ Object& film(SceneMaker& scene, const Parameters& in, const Options& options, do
     const double white = in.number("whitebalance", 0);
     if (sensor != "cie1931" || white != 0)
         scene.report.note(in.where, "colours are those of sensor cie1931 without white balance; '" + sensor +
-                                        "' counts for its exposure only");
+                                        "' sets the exposure only");
     if (in.find("maxcomponentvalue"))
         scene.report.note(in.where_of("maxcomponentvalue"), "samples are not clamped: maxcomponentvalue is left out");
     in.ignore({"filename", "savefp16"});  // where the image goes; floats hold what halves do
@@ -185,7 +185,8 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
     if (!is_known("integrator", in.type))
         scene.report.refuse(in.where, not_supported("integrator", in.type), "path is used");
     else if (in.type != "path" && in.type != "volpath" && !light && !bdpt)
-        scene.report.note(in.where, "integrator '" + in.type + "' has the image of the path tracer, which is used");
+        scene.report.note(in.where,
+                          "integrator '" + in.type + "' converges to the image of the path tracer, which is used");
     Object& out = add_to_scene(scene.document, "integrator", light ? "ptracer" : bdpt ? "bdpt" : "path", in.where);
     const int64_t depth = in.integer("maxdepth", 5);
     if (depth < 0 || depth > (1 << 30)) fail(in.where_of("maxdepth"), "maxdepth must not be negative");

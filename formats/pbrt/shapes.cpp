@@ -188,7 +188,7 @@ Placed add_curve(SceneMaker& scene, const Parameters& in, Look& look) {
     }
     const bool textured = has_texture(*look.bsdf);
     if (textured)
-        scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
+        scene.report.note(in.where, "textures wrap around curves; in pbrt they run from edge to edge as seen");
     Placed placed;
     if (!curves.empty())
         placed.object =
@@ -238,7 +238,7 @@ void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh) {
     if (scene.state.reverse_orientation) set_boolean(shape, "flip_normals", true);
     add_child(shape, *look.bsdf);
     if (scene.state.area_light && scene.open_object)
-        scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
+        scene.report.note(in.where, "shapes of an object do not emit, as in pbrt");
     else if (scene.state.area_light)
         add_child(shape, area_emitter(scene, *scene.state.area_light, uv_map(look.surface), placed.area, look.hidden,
                                       look.hidden ? Texture{} : scene.textures.number(in, "alpha", 1)));

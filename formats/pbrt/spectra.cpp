@@ -167,7 +167,8 @@ Rgb SpectrumReader::color(const Parameter& p, ColorUse use, ColorSpace space) co
             color[i] = float(clipped ? std::max(c, 0.0) : c);
             if (use == ColorUse::reflectance && color[i] > 1) clipped = true, color[i] = 1;
         }
-        if (clipped) report.note(p.where, "colours that linear Rec.709 has not are clipped at 0, of surfaces at 1");
+        if (clipped)
+            report.note(p.where, "colours outside of linear Rec.709 are clipped at 0, those of surfaces also at 1");
     } else if (p.type == "blackbody") {
         count(1);
         if (!(p.numbers[0] > 0)) fail(p.where, "the temperature of '" + p.name + "' must be positive");

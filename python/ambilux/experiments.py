@@ -47,7 +47,7 @@ class Plots:
 
 
 class Results:
-    """The folder of an experiment. Properties are frames of pandas (ambilux.analysis.frames; columns: docs/experiments.md), `plot` has the figures."""
+    """The folder of an experiment. Properties are frames of pandas (ambilux.analysis.frames; columns: docs/analysis.md), `plot` has the figures."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder)

@@ -85,8 +85,8 @@ def render(scene: Scene | str | os.PathLike[str], integrator: str | None = None,
     after the sample per pixel in work. Raises UsageError for values that are not allowed, DeviceError where the device or its memory fails.
 
     `aovs` names layers, which become `image.aovs`: albedo, normal, depth, position, samples, variance (docs/aovs.md). With `technique_images` there are images of
-    all strategies in `image.strategies`, and as files in the folder of that name, if it is one. `outliers` pixels are in `image.outliers`, those whose largest
-    sample exceeds the mean of their others most.
+    all strategies in `image.strategies`, and as files in the folder of that name, if it is one. `image.outliers` lists `outliers` pixels, by the largest
+    difference between one sample and the mean of their others.
 
     >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape

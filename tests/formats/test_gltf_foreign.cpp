@@ -180,7 +180,7 @@ TEST_CASE("anisotropy, light that passes and attenuation as the principled BSDF 
         {"KHR_materials_volume",
          {{"thicknessFactor", 2}, {"attenuationDistance", 1}, {"attenuationColor", {1, 0.5, 0.25}}}}};
     const Scene g = load(glass);
-    CHECK(has_note(g, "attenuation in a volume goes by the thickness"));
+    CHECK(has_note(g, "attenuation in a volume uses the thickness"));
     check_rgb(g.bsdfs[g.materials[g.shapes[0].material].front].as<Dielectric>().specular_transmittance.value,
               {1, 0.5f, 0.25f}, 1e-5);
 }
@@ -242,7 +242,7 @@ TEST_CASE("sets of texture coordinates: two of one content, none, and one that a
     material(none)["pbrMetallicRoughness"] = {{"baseColorTexture", {{"index", 0}}}};
     attributes(none).erase("TEXCOORD_0");
     const Scene s = load(none);
-    CHECK(has_note(s, "textures of a mesh without texture coordinates are of one colour"));
+    CHECK(has_note(s, "textures have one colour on a mesh without texture coordinates"));
     CHECK(s.vertices[2].uv().x == 0);
 
     Json moved = quad_scene();

@@ -140,7 +140,7 @@ TEST_CASE("what shines and has two sides shines on both") {
     const Scene s = load(j);
     REQUIRE(s.emitters.size() == 2);
     REQUIRE(s.shapes.size() == 2);
-    CHECK(has_note(s, "two-sided surfaces that shine are two"));
+    CHECK(has_note(s, "two-sided emissive surfaces become two"));
     CHECK(s.emitters[1].radiance.value == s.emitters[0].radiance.value);
     for (const MeshVertex& v : s.vertices) CHECK(v.p.z == Approx(v.n.z > 0 ? 0.0 : -2e-5).margin(1e-6));
     j["materials"][0]["alphaMode"] = "BLEND";
@@ -278,8 +278,8 @@ TEST_CASE("lights that shine nothing are none") {
     CHECK(textured({0, 0, 0, 1, 0, 0}).environment == kNone);
     // In scenes of Mitsuba, whose images are black without light, a note says so.
     const std::string point = "<shape type='rectangle'/><emitter type='point'><rgb name='intensity' value='";
-    CHECK(has_note(test::load(point + "0'/></emitter>"), "none of its lights shines"));
-    CHECK_FALSE(has_note(test::load(point + "0, 1, 0'/></emitter>"), "none of its lights shines"));
+    CHECK(has_note(test::load(point + "0'/></emitter>"), "all its lights have zero radiance"));
+    CHECK_FALSE(has_note(test::load(point + "0, 1, 0'/></emitter>"), "all its lights have zero radiance"));
 }
 
 TEST_CASE("what is not known is refused by name") {

@@ -123,7 +123,7 @@ TEST_CASE("colours of vertices are factors of the base colour") {
     j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
     // Beside a texture, by the mean of each triangle: (1, 0, 0), (0, 1, 0), (0, 0, 1) and (1, 0, 0), (0, 0, 1), white.
     const Scene beside = load(j);
-    CHECK(has_note(beside, "the mean of each triangle counts"));
+    CHECK(has_note(beside, "are averaged over each triangle"));
     REQUIRE(beside.shapes.size() == 2);
     std::vector<Rgb> colors;
     for (const Shape& shape : beside.shapes) {
@@ -245,7 +245,7 @@ TEST_CASE("scaled normals, means of textures, modes of the two axes") {
                                                                        {"clearcoatTexture", {{"index", 1}}}};
     coated["extensionsUsed"] = {"KHR_materials_clearcoat"};
     CHECK(principled(load(coated)).clearcoat == Approx(0.5 * 0.4));
-    CHECK(has_note(load(coated), "of clearcoatTexture the mean counts"));
+    CHECK(has_note(load(coated), "clearcoatTexture counts by its mean"));
 
     // Coordinates within [0, 1] take the other axis's mode, others a mirrored image.
     const auto base = [](Json file) -> Json {

@@ -99,12 +99,13 @@ TEST_CASE("OBJ: what faces name and the file has none of is told once, and left 
         CHECK(mesh.faces == plain.faces);
         CHECK(mesh.uvs.empty());
         CHECK(mesh.normals.empty());
-        CHECK(mesh.notes == std::vector<std::string>{"faces name texture coordinates, and the obj file has none",
-                                                     "faces name normals, and the obj file has none"});
+        CHECK(mesh.notes ==
+              std::vector<std::string>{"faces have indices of texture coordinates, which the obj file lacks",
+                                       "faces have indices of normals, which the obj file lacks"});
     }
     const Mesh one = read_obj("m.obj", vertices + "vt 0.5 0.5\nf 1/1/1 2/1/2 3/1/3\n", true);
     CHECK(one.uvs.size() == 3);
-    CHECK(one.notes == std::vector<std::string>{"faces name normals, and the obj file has none"});
+    CHECK(one.notes == std::vector<std::string>{"faces have indices of normals, which the obj file lacks"});
 }
 
 TEST_CASE("OBJ: mistakes are named with their line") {

@@ -120,7 +120,7 @@ TEST_CASE("OBJ: colours behind the places of vertices are the attribute vertex_c
     memcpy(texel, shown.texels.data() + shown.textures.at(0).offset, sizeof texel);
     check_rgb({texel[0], texel[1], texel[2]}, {1, 0.5f, 0}, 1e-6);
     CHECK_FALSE(has_note(shown, "not used"));
-    CHECK(has_note(scene(""), "the obj file has what is not used: colours of vertices"));
+    CHECK(has_note(scene(""), "the obj file has unused data: colours of vertices"));
 }
 
 TEST_CASE("PLY: texture coordinates of corners divide the vertices where they differ") {
@@ -273,9 +273,9 @@ TEST_CASE("PLY: bytes of colours are sRGB in formats 0.x and linear, with a note
     check_rgb(first(older), {0.5776f, 0.1274f, 0.0319f}, 1e-4);
     check_rgb(first(newer), Rgb{200, 100, 50} / 255.0f, 1e-5);
     CHECK_FALSE(has_note(older, "255"));
-    CHECK(has_note(newer, "colours in whole numbers are parts of the largest, 255"));
+    CHECK(has_note(newer, "integer colours are divided by 255"));
     // Nothing shows them here: they are named once, for both shapes.
-    CHECK(has_note(scene("3.0.0", ""), "m.ply: the ply file has what is not used: red green blue"));
+    CHECK(has_note(scene("3.0.0", ""), "m.ply: the ply file has unused data: red green blue"));
     CHECK_FALSE(has_note(newer, "not used"));
 }
 
@@ -287,7 +287,7 @@ TEST_CASE("normals that are not finite count as none, with their number in a not
         CHECK(ply.normals[0] == Vec3f{0, 0, 1});
         CHECK(ply.normals[1] == Vec3f{0, 0, 0});
         REQUIRE(ply.notes.size() == 1);
-        CHECK(contains(ply.notes[0], "not finite count as none: 2"));
+        CHECK(contains(ply.notes[0], "not finite are replaced by the triangle's: 2"));
         const Mesh obj = read_obj("a.obj", kVertices + "vn " + bad + "\nf 1//1 2//2 3//1\n", true);
         CHECK(obj.normals[1] == Vec3f{0, 0, 0});
         CHECK(obj.notes.size() == 1);
@@ -298,11 +298,11 @@ TEST_CASE("normals that are not finite count as none, with their number in a not
     const Scene s = load("<shape type='ply'><string name='filename' value='m.ply'/></shape><emitter type='point'/>", {},
                          "3.0.0", &folder);
     for (const MeshVertex& v : s.vertices) CHECK(v.n == Vec3f{0, 0, 1});
-    CHECK(has_note(s, "m.ply: normals that are not finite count as none: 1"));
+    CHECK(has_note(s, "m.ply: normals that are not finite are replaced by the triangle's: 1"));
     const Scene p =
         load_pbrt_world("LightSource \"point\"\nShape \"plymesh\" \"string filename\" \"m.ply\"", {}, &folder);
     for (const MeshVertex& v : p.vertices) CHECK(v.n == Vec3f{0, 0, 1});
-    CHECK(has_note(p, "m.ply: normals that are not finite count as none: 1"));
+    CHECK(has_note(p, "m.ply: normals that are not finite are replaced by the triangle's: 1"));
 }
 
 TEST_CASE("PLY: triangle strips turn over at every second triangle and end at -1") {

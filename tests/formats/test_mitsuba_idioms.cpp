@@ -118,7 +118,7 @@ TEST_CASE("integrators of the same equation are the path tracer") {
                                      "0.5.0");
         CHECK(s.integrator.type == "path");
         CHECK(s.integrator.max_depth == 7);
-        CHECK(has_note(s, "has the image of the path tracer"));
+        CHECK(has_note(s, "converges to the image of the path tracer"));
     }
     for (const char* type : {"aov", "multichannel", "adaptive", "irrcache"}) {
         const Scene s = load_quietly("<integrator type='" + std::string(type) +

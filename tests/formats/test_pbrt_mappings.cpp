@@ -212,7 +212,7 @@ TEST_CASE("ribbons face their normals, and u goes along curves") {
     const Scene tube = load_pbrt_world(texture("") + kTextured + curve);
     for (size_t i = 0; i < tube.vertices.size(); ++i)
         CHECK(tube.vertices[i].u == Approx(double(tube.vertices[i].p.x) / 3).margin(1e-5));
-    CHECK(has_note(tube, "textures on curves go round them"));
+    CHECK(has_note(tube, "textures wrap around curves"));
 }
 
 TEST_CASE("coatings dim what passes them") {

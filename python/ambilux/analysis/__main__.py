@@ -1,4 +1,4 @@
-"""python -m ambilux.analysis RESULTS -o OUT, python -m ambilux.analysis pack RESULTS -o FILE.zip: see docs/experiments.md.
+"""python -m ambilux.analysis RESULTS -o OUT, python -m ambilux.analysis pack RESULTS -o FILE.zip: see docs/analysis.md.
 
 Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input or a part that failed (all
 others are made, and report.html names it; that a reference is black is no failure), 4 a file that cannot be written.

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from ambilux.analysis.statistics import Estimate
 
 
-# Variance of an image's mean over what its pixels tell, if light subpaths reach several pixels each: 1.3^2 on veach-mis (docs/experiments.md).
+# Variance of an image's mean over what its pixels tell, if light subpaths reach several pixels each: 1.3^2 on veach-mis (docs/lab/2026-11-25-coverage.md).
 DEPENDENT = 1.7
 
 

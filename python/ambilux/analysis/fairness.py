@@ -44,15 +44,15 @@ def repeat_remarks(experiment):
         return listed([f"{scene} {run} seed {seed} ({why})" for (scene, run, seed), why in found.items()], 3)
     mended = {place: why for place, why in again.items() if place not in left}
     if mended:
-        yield f"{renders(len(mended))} disturbed and made again, the last one counts: {places(mended)}"
+        yield f"{renders(len(mended))} disturbed and repeated; the last attempt counts: {places(mended)}"
     shared = experiment.manifest.get("ranks_share")
     if shared:
-        yield f"{shared}: no time is that of a render alone, and none was made again for it"
+        yield f"{shared}: all times are disturbed, and no render was repeated for that reason"
     if left:
         times = not shared and experiment.manifest.get("repeats")
-        tried = f", also when made again up to {times} time{'s' if times > 1 else ''}" if times else " and not made again" + ("" if shared else " (repeats = 0)")
+        tried = f" in each of up to {1 + times} attempts" if times else " and not repeated" + ("" if shared else " (repeats = 0)")
         every = sum(len(experiment.seeds(scene, run)) for scene in experiment.scenes for run in experiment.runs)
-        yield f"{renders(len(left))} disturbed{tried}, of {every}; do not trust their times: {places(left)}"
+        yield f"of {every} renders, {len(left)} {'were' if len(left) > 1 else 'was'} disturbed{tried}; do not trust the times of {places(left)}"
 
 
 def renders(count):
@@ -68,7 +68,7 @@ def slowdown_remarks(experiment):
                 for name in sorted({n for p in parts for n in (p.get("gpu") or {}).get("slowdowns") or ()}):
                     found.setdefault(name, []).append(f"{scene} {run} seed {seed}")
     for name, places in found.items():
-        yield f"clocks of the device were held down ({name}) during {listed(places)}"
+        yield f"the device lowered its clocks ({name}) during {listed(places)}"
 
 
 def listed(places, most=5):
@@ -103,4 +103,4 @@ def remarks(experiment):
         low, high = min(clocks, key=clocks.get), max(clocks, key=clocks.get)
         yield f"clocks of the CPU moved: {clocks[low]:.0f} MHz at {low}, {clocks[high]:.0f} at {high}"
     if silent == len(experiment.scenes) * len(experiment.runs):
-        yield "what else ran on the machine was not recorded (no render is complete, or an older version made them): a busy machine would not show"
+        yield "the load of the machine was not recorded (no render is complete, or an older version made them): the report cannot show disturbed renders"

@@ -1,6 +1,6 @@
 """Results as pandas frames: from ambilux.analysis import frames; frames.runs("out/convergence").
 
-Each function takes a folder or what experiment.load returned. Columns: docs/experiments.md. The package pandas is needed for this module alone.
+Each function takes a folder or what experiment.load returned. Columns: docs/analysis.md. The package pandas is needed for this module alone.
 """
 
 import dataclasses

@@ -146,7 +146,7 @@ def cells_of(experiment, lines, headings, notes):
 def results(experiment, lines):
     """table.tex: error, efficiency and ratio of every run, as wide as a page."""
     shown = ["spp", LEADS[experiment.metric][0], "efficiency", "ratio [95 %]", "time to equal RMSE"]
-    return of_page_width(tables.caption(experiment, lines, with_reasons=False), shown, lines, lambda notes: cells_of(experiment, lines, shown, notes))
+    return of_page_width(tables.caption(experiment, lines, with_marks=True), shown, lines, lambda notes: cells_of(experiment, lines, shown, notes))
 
 
 def errors(experiment, lines):
@@ -173,7 +173,7 @@ def column(experiment, lines):
                 body += [r"\midrule", rf"\multicolumn{{3}}{{l}}{{\emph{{{escape(line.scene)}}}}} \\"]
             scene = line.scene
             body.append(" & ".join([name(line.run, letters), *cells(line)]) + r" \\")
-        made.append(tabular(tables.caption(experiment, lines, with_reasons=False), ["run", *shown], "lrr", body, notes))
+        made.append(tabular(tables.caption(experiment, lines, with_marks=True), ["run", *shown], "lrr", body, notes))
     return made
 
 

@@ -31,12 +31,12 @@ def trimmed_remarks(experiment, lines):
         # Of errors that differ in rounding alone, the first run's.
         least = {m: min(getattr(line, m).value for line in known) for m in ("relmse", "trimmed")}
         whole, trimmed = (next(line.run for line in known if getattr(line, m).value <= least[m] * (1 + ROUNDING)) for m in least)
-        better = f"; without them {trimmed} has the least error, with them {whole}" if whole != trimmed else ""
+        better = f"; {trimmed} has the lowest trimmed relMSE, {whole} the lowest relMSE" if whole != trimmed else ""
         few.sort(key=lambda line: -line.few_pixels)
         told = ", ".join(f"{line.run} {line.few_pixels:.3g}" for line in few[:4])
         more = f" and {len(few) - 4} more, down to {few[-1].few_pixels:.3g}" if len(few) > 4 else ""
-        yield (f"{scene}: the worst {trimmed_share(experiment)} of the pixels hold more than half of relMSE, which is so many times the trimmed one: {told}{more}"
-               f"{better}; state both")
+        yield (f"{scene}: the worst {trimmed_share(experiment)} of the pixels hold more than half of relMSE. relMSE over trimmed relMSE: {told}{more}"
+               f"{better}. State both")
 
 
 def method_remarks(experiment):
@@ -46,7 +46,7 @@ def method_remarks(experiment):
             found = experiment.methods(scene, run)
             if len(found) > 1:
                 told = "; ".join(f"{method} (seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))})" for method, seeds in found.items())
-                yield f"{scene}, {run}: seeds ran different methods, so that their mean is of a mixture: {told}"
+                yield f"{scene}, {run}: seeds ran different methods, so that their mean is that of a mixture: {told}"
 
 
 def same_remarks(lines, experiment=None):
@@ -64,9 +64,9 @@ def same_remarks(lines, experiment=None):
         elif r.low <= 1 <= r.high:
             said = f"no effect on time per sample found: {told}"
         else:
-            said = f"{told}, which {line.seeds} seeds cannot tell from 1 at the level of the whole table"
-        yield (f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
-               + ("; it sets what that run has anyway, so that the difference is that of the machine" if anyway else ""))
+            said = f"{told}; 1 is outside of the interval, but {line.seeds} seeds are too few to claim a difference at the level of all statements"
+        yield (f"{line.scene}, {line.run}: the same images at equal seeds as the base run; {said}"
+               + ("; its settings are those of the base run, so that the difference shows how far times can be trusted" if anyway else ""))
 
 
 def sets_nothing(experiment, scene, run):
@@ -118,7 +118,17 @@ def clock_remarks(experiment):
     for name in a.keys() & b.keys():
         if max(a[name], b[name]) > SLOW_CLOCK * min(a[name], b[name]):
             idle = " (an idle GPU shows low clocks before its first work)" if name.startswith("GPU") else ""
-            yield (f"{name}: {a[name]:.0f} MHz at {first}, {b[name]:.0f} at {last}{idle}; times of early and late renders may not compare")
+            yield (f"{name}: {a[name]:.0f} MHz at {first}, {b[name]:.0f} at {last}{idle}; times of early and late renders may not be comparable")
+
+
+def stated_bias_remarks(lines):
+    """Runs whose method says that it is biased, by what it says."""
+    said = {}
+    for line in lines:
+        if line.stated_bias:
+            said.setdefault(line.stated_bias, {})[line.run] = True
+    for bias, runs in said.items():
+        yield f"{listed(list(runs))}: {bias}, so that errors include this bias and need not fall with slope −1/2"
 
 
 def has_black_reference(experiment, scene):
@@ -138,16 +148,15 @@ def remarks(experiment, lines):
             found.append(f"{scene}: no results yet")
             continue
         if has_black_reference(experiment, scene):
-            found.append(f"{scene}: its reference is black, so that relative errors mean nothing and FLIP has none: look for light that no path finds")
+            found.append(f"{scene}: its reference is black, so that relative errors and FLIP are undefined: look for light that no path finds")
         for run in experiment.runs:
             have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
             if len(have) < len(every) and (have or not peers.is_left_out(experiment, scene, run)):
                 found.append(f"{scene}, {run}: {len(have)} of {len(every)} checkpoints recorded; figures and table use what is there")
+    found += stated_bias_remarks(lines)
     threshold, quiet = verdicts.bias_threshold(verdicts.family(lines)), {}
     for line in lines:
         place = f"{line.scene}, {line.run}"
-        if line.stated_bias:
-            found.append(f"{place}: {line.stated_bias}, so that errors hold this bias and need not fall with −1/2 of samples")
         noise = summary.reference_noise(experiment, line.scene)
         if line.invalid:
             found.append(f"{place}: {line.invalid} values were NaN, Inf or negative and were dropped")
@@ -155,15 +164,15 @@ def remarks(experiment, lines):
         if broken:
             found.append(f"{place}: the error of {broken} checkpoints is NaN or infinite; they are left out of figures and means")
         if line.bias_z > threshold:
-            found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; chance stays below {threshold:.1f} (1 % over all statements)")
+            found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; chance exceeds {threshold:.1f} in less than 1 % of reports")
         elif line.bias and line.bias.p < verdicts.limit(lines):
             found.append(f"{place}: the mean over seeds differs from the reference's by {line.bias.estimate.value:+.2e} ± {line.bias.estimate.error:.1e}, "
-                         "noise of the reference included; chance does that in less than 1 % over all statements")
+                         "noise of the reference included; chance does that in less than 1 % of reports")
         if not line.stated_bias and verdicts.slope_p(line) < verdicts.limit(lines):
-            found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} of samples, which is not the −1/2 of independent "
-                         "samples without bias: look for bias, rare bright samples, or samples that are not independent")
+            found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} instead of the −1/2 of independent, unbiased "
+                         "samples: look for bias, rare bright samples, or dependent samples")
         if not line.rmse.value >= noise and not math.isnan(noise):
             quiet.setdefault(line.scene, []).append(line.run)
     for scene, runs in quiet.items():
-        found.append(f"{scene}: the error of {listed(runs)} is below the noise of the reference ({summary.reference_noise(experiment, scene):.2g}) and so uncertain; a longer reference helps")
+        found.append(f"{scene}: the error of {listed(runs)} is below the noise of the reference ({summary.reference_noise(experiment, scene):.2g}) and therefore uncertain; use a longer reference")
     return found + list(method_remarks(experiment)) + list(same_remarks(lines, experiment)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))

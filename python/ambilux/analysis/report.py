@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib import colormaps
 from PIL import Image
 
-from ambilux.analysis import captions, convergence, figures, flip_maps, hdr_data, images, peers, style, summary, tables, verdicts
+from ambilux.analysis import captions, convergence, figures, flip_maps, hdr_data, images, peers, statistics, style, summary, tables, verdicts
 from ambilux.analysis import remarks as remarks_of
 
 PAGE = Path(__file__).parent / "page"
@@ -121,9 +121,13 @@ def figure(out, name, title, caption):
 
 
 def verdict_table(lines):
-    rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{tables.breakable(run)}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
-            for (scene, run), (slope, bias) in verdicts.verdicts(lines).items()]
-    return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
+    """A row for each run; runs of a scene of which the same is said share one."""
+    runs = {}
+    for (scene, run), said in verdicts.verdicts(lines).items():
+        runs.setdefault((scene, *said), []).append(run)
+    rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{', '.join(map(tables.breakable, names))}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
+            for (scene, slope, bias), names in runs.items()]
+    return ('<table class="said verdicts"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 
 
 def render(experiment, lines, remarks, made, out, full_size=False):
@@ -144,12 +148,13 @@ def render(experiment, lines, remarks, made, out, full_size=False):
     body += ['<h2 id="convergence">Convergence</h2>', '<div class="plot"></div>',
              '<p class="note">Lines: arithmetic mean over seeds (RMSE: root of the mean of squares); bands: its 95 % interval over seeds, where the data support one. The noise of the reference is subtracted where it is known. '
              f"{html.escape(summary.rows_used(experiment))}</p>",
-             '<h2 id="table">Table</h2>', f'<div class="wide">{tables.to_html(experiment, lines)}</div>',
-             f'<p class="note">{html.escape(tables.caption(experiment, lines))} '
-             "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p>",
+             '<h2 id="table">Table</h2>', f'<div>{tables.to_html(experiment, lines)}{tables.marks_html(experiment, lines)}</div>',
+             f'<details class="note"><summary>How these numbers are made</summary><p>{html.escape(tables.caption(experiment, lines))} '
+             "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p></details>",
              f'<div class="wide">{verdict_table(lines)}</div>',
              '<p class="note">Slope of log RMSE against log samples, over checkpoints in samples (over all, if the experiment has one kind) above the noise of the '
-             "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table, its interval with the noise of the reference. A departure is claimed where chance alone makes one, or any other statement of the tables, in less than 1 % of such reports.</p>"]
+             "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table; its interval includes the noise of the reference. A departure is claimed where chance alone makes it, or any other "
+             f"statement of the tables, in less than 1 % of such reports. “Would have been”: with a chance of {statistics.POWER:.0%} at that level. A test that could not find a slope of {verdicts.WEAK - 0.5:g} is not counted as one.</p>".replace("0%", "0 %")]
     body += ['<h2 id="references">References</h2>', f'<div class="wide">{reference_table(experiment)}</div>']
     if peers.entries(experiment):
         body += ['<h2 id="peers">Other renderers</h2>', f'<div class="wide">{peers.to_html(experiment)}</div>', f'<p class="note">{html.escape(peers.NOTE)}</p>']

@@ -7,7 +7,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, norm
 from scipy.stats import t as student
+
+POWER = 0.9  # chance with which a test finds a departure that it is said to find
 
 
 @dataclass(frozen=True)
@@ -95,3 +99,13 @@ def two_sided_p(value, error, expected, samples):
     if error == 0:
         return 1.0 if math.isclose(value, expected, rel_tol=1e-9) else 0.0
     return float(2 * student.sf(abs(value - expected) / error, samples - 1))
+
+
+def detectable(level, degrees):
+    """Departure, in standard errors, that Student's two-sided test at `level` finds with chance POWER.
+
+    It finds a departure d where |d + Z| > t(1 - level/2) sqrt(X / nu), Z normal, X chi-squared with nu degrees of freedom (noncentral t, e.g. Johnson and Kotz 1970, chapter 31). The
+    chance is averaged over 2000 quantiles of X, without the tail on the other side."""
+    bound = student.isf(level / 2, degrees)
+    spread = np.sqrt(chi2.ppf((np.arange(2000) + 0.5) / 2000, degrees) / degrees) if math.isfinite(degrees) else np.ones(1)
+    return float(brentq(lambda d: float(norm.sf(bound * spread - d).mean()) - POWER, 0.0, 40.0 * bound + 10.0))

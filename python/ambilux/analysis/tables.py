@@ -9,29 +9,32 @@ import re
 from ambilux.analysis import efficiency, heavy_tails, remarks, summary, verdicts
 
 CAPTION = (
-    "Each run at the last checkpoint {kind}that all runs of the scene have reached: {equal}. All errors are of all pixels and arithmetic "
-    "means over seeds (RMSE: root of the mean of squares), with the noise of the reference subtracted where it is known; time is inside the renderer. "
-    "Efficiency is 1 / ({metric} · time){own}, and its ratio that over {base}'s; brackets are 95 % intervals over {units}; where data cannot support one, words say why and there is no ratio{reasons}. "
+    "Each run at the last checkpoint {kind}that all runs of the scene have reached: {equal}. Errors are arithmetic means over seeds, of all pixels "
+    "(RMSE: root of the mean of squares), less the noise of the reference where it is known; time is inside the renderer. "
+    "Efficiency is 1 / ({metric} · time){own}; its ratio is over that of {base}; brackets are 95 % intervals over {units}; where the data support none, there is no ratio either. "
     "{same}"
-    "Bold: the best of a scene, if it is above every other by more than chance (1 % over all statements of the table). "
-    "Time to equal RMSE is that of {base} over the run's, from mean errors; > and < are bounds, since a time lies outside of what was measured by more than a factor of 4; a question mark: there is no "
-    "interval of an RMSE behind it; a dagger marks runs whose "
-    "mean, or {base}'s, is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
-    " is the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
+    "Bold: the best run of a scene, if it is above every other by more than chance (1 % over all statements of the tables). "
+    "Time to equal RMSE is that of {base} over that of the run, from mean errors{marks}. "
+    "The slope is that of log RMSE against log samples, fitted for each seed; ± is the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
-SAME_CAPTION = ("An equals sign: the run makes {base}'s images at equal seeds, so that the ratio is that of times per "
-                "sample, over pairs of seeds. ")
+SAME_CAPTION = "An equals sign: the run makes the images of {base} at equal seeds, so that the ratio is that of times per sample, over pairs of seeds. "
+MARKS = {  # of the column of times: what a sign in a cell means
+    "†": "the mean of the run, or of {base}, is off by more than chance allows, so that the two do not approach the same image",
+    "?": "an RMSE behind the number has no interval: it may be off by more than it seems",
+    "> <": "a bound: one of the times lies outside of what was measured by more than a factor of 4",
+}
 EQUAL = {"time": "equal time", "samples": "equal samples, at times that differ"}
 UNITS = {"batches": "batches of passes of all seeds (of times: over seeds)", "seeds": "seeds", "pairs of seeds": "pairs of seeds"}
 REASONS = {  # what the words of a doubt mean, by how they begin or end
-    "few samples decide": f"one batch of passes holds {heavy_tails.LARGEST:g} times the mean error or more, so that there may be more beyond",
+    "few samples decide": f"the error of one batch of passes is {heavy_tails.LARGEST:g} times the mean or more, so that rarer and larger ones may exist",
     "batches do not average out": f"the error of the whole image is {heavy_tails.AVERAGING:g} times what independent batches make of it or more, because of bias, or of light that no batch has found",
     "seeds differ": "batches of different seeds differ by more than chance",
-    "seeds ran different methods": "bdpt.auto selected another one, and batches of one seed are all of one",
+    "seeds ran different methods": "bdpt.auto selected another method with another seed",
     "few pixels decide": f"the worst pixels hold {1 - 1 / heavy_tails.TRIMMED:.0%} of relMSE or more".replace("%", " %"),
-    "batches": f"fewer than {heavy_tails.FEWEST_BATCHES}", "seeds": f"fewer than {heavy_tails.FEWEST_SEEDS}, or than {heavy_tails.FEWEST_RESAMPLED_SEEDS} of which it is not known whether few pixels decide",
-    "seed": "how much seeds differ is not known",
+    "batches": f"fewer than {heavy_tails.FEWEST_BATCHES}", "seeds": f"fewer than {heavy_tails.FEWEST_SEEDS}, or fewer than {heavy_tails.FEWEST_RESAMPLED_SEEDS} without a trimmed error, which would show whether few pixels decide",
+    "seed": "a single seed does not show how much seeds differ",
 }
+COUNTED = {"batches": "N batches", "seeds": "N seeds", "seed": "1 seed"}  # of REASONS: what cells say
 TRIMMED_CAPTION = (" Trimmed relMSE leaves out the worst {share} of the pixels; ×N is relMSE over it. It is no estimate of relMSE: a method that finds light only "
                    "in rare outliers looks better by it than it is.")
 
@@ -130,11 +133,6 @@ def kind_of(doubt):
     return next((key for key in REASONS if re.search(rf"(^|: |\d ){re.escape(key)}( \(|$)", doubt)), None)
 
 
-def reasons(doubts):
-    """Sentences on the words of doubts, for those that are there."""
-    return "; ".join(f"{key}: {REASONS[key]}" for key in REASONS if key in set(map(kind_of, doubts)))
-
-
 def units(lines):
     """Over what the intervals of the ratios are, such as "batches of passes of all seeds (of times: over seeds) and pairs of seeds"."""
     over = {line.ratio.over for line in lines if line.ratio is not None and line.ratio.trusted}
@@ -145,14 +143,25 @@ def same_sentence(lines, base):
     return SAME_CAPTION.format(base=base) if any(line.ratio_time is not None for line in lines) else ""
 
 
-def caption(experiment, lines, with_reasons=True):
-    """with_reasons: what the words of doubts mean (tables for papers have them below)."""
-    equal = summary.equal(experiment)
-    told = reasons([line.ratio.doubt for line in lines if line.ratio is not None and line.run != experiment.base]) if with_reasons else ""
+def marks(experiment, lines):
+    """[(sign or words, meaning)] of what cells of the table hold beside numbers."""
+    base, biased = experiment.base, verdicts.biased(lines)
+    told = "".join(speedup_text(line, base, biased) for line in lines)
+    found = [(sign, text.format(base=base)) for sign, text in MARKS.items() if any(s in told for s in sign.split())]
+    if same := same_sentence(lines, base):
+        found.insert(0, ("=", same.removeprefix("An equals sign: ").rstrip(". ")))
+    kinds = {kind_of(line.ratio.doubt) for line in lines if line.ratio is not None and line.run != base}
+    return found + [(COUNTED.get(words, words), f"no interval and no ratio: {text}") for words, text in REASONS.items() if words in kinds]
+
+
+def caption(experiment, lines, with_marks=False):
+    """with_marks: what signs in cells mean, where no list stands beside the table (marks_html)."""
+    equal, base = summary.equal(experiment), experiment.base
     batches = any(line.efficiency is line.efficiency_batches and line.efficiency is not None for line in lines)
-    return (CAPTION.format(base=experiment.base, metric=efficiency.NAMES[experiment.metric], units=units(lines), reasons=f" ({told})" if told else "", same=same_sentence(lines, experiment.base),
+    told = "".join(f"; {sign}: {text.format(base=base)}" for sign, text in MARKS.items()) if with_marks else ""
+    return (CAPTION.format(base=base, metric=efficiency.NAMES[experiment.metric], units=units(lines), marks=told, same=same_sentence(lines, base) if with_marks else "",
                            kind="" if len(experiment.budgets) < 2 else {"time": "in seconds ", "samples": "in samples "}[equal], equal=EQUAL[equal],
-                           own=", from batches where they are to be trusted, so that it may differ a little from that of the columns beside it" if batches else "")
+                           own=", from batches where their interval can be stated, so that it may differ a little from that of the columns beside it" if batches else "")
             + (TRIMMED_CAPTION.format(share=remarks.trimmed_share(experiment)) if "trimmed relMSE" in headings(experiment, lines) else ""))
 
 
@@ -173,7 +182,7 @@ def csv_columns():
 
 
 def to_csv(lines):
-    """All numbers in full precision, for further work. Columns: docs/experiments.md."""
+    """All numbers in full precision, for further work. Columns: docs/analysis.md."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(csv_columns())
@@ -229,20 +238,38 @@ def is_words(cell):
     return cell.count(" ") > 1 and not re.match(r"[\d<−–]", cell)
 
 
+def leading(experiment):
+    """Columns that a page shows at once; the others when asked."""
+    return ("scene", "run", "spp" if summary.equal(experiment) == "time" else "time (s)", "relMSE" if experiment.metric == "relmse" else "RMSE", "ratio [95 %]", "time to equal RMSE")
+
+
 def to_html(experiment, lines):
-    shown = headings(experiment, lines)
-    head = "".join(f"<th>{html.escape(h)}</th>" for h in (*shown, "Mrays/s", "bias |z|"))
-    out = [f'<table class="results"><thead><tr>{head}</tr></thead><tbody>']
+    """A box that shows all columns, without a script, and the table. Columns of the class more are those that it adds; those of the class roomy are left out of a narrow window, too."""
+    leads, last = leading(experiment), ("Mrays/s", "bias |z|")
+    shown = sorted(headings(experiment, lines), key=lambda h: h not in leads)
+    kinds = ["" if h in leads[:2] or h in leads[3:5] else "roomy" if h in leads else "more" for h in (*shown, *last)]
+    attribute = [f' class="{kind}"' if kind else "" for kind in kinds]
+    out = [f'<input type="checkbox" id="every-column"><label for="every-column">all columns ({html.escape(", ".join(h for h in (*shown, *last) if h not in leads))})</label>',
+           '<div class="wide"><table class="results"><thead><tr>' + "".join(f"<th{a}>{html.escape(h)}</th>" for a, h in zip(attribute, (*shown, *last))) + "</tr></thead><tbody>"]
     scene, biased = None, verdicts.biased(lines)
     bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
     for line in lines:
         row = [html.escape(minus(c)) if i > 1 else breakable(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is bold.get(line.scene):
-            row[shown.index("efficiency")] = f"<b>{row[shown.index('efficiency')]}</b>"
-        kind = ' class="first"' if line.scene != scene else ""
+            at = shown.index("ratio [95 %]")
+            row[at] = f"<b>{row[at]}</b>"
+        first = ' class="first"' if line.scene != scene else ""
         if line.scene == scene:
             row[0] = ""
         scene = line.scene
-        out.append(f"<tr{kind}>" + "".join(f'<td class="words">{c}</td>' if is_words(c) else f"<td>{c}</td>" for c in row) + "</tr>")
-    return "\n".join([*out, "</tbody></table>"])
+        classes = [" ".join(filter(None, (kind, "words" if is_words(c) else ""))) for kind, c in zip(kinds, row)]
+        out.append(f"<tr{first}>" + "".join(f'<td class="{kind}">{c}</td>' if kind else f"<td>{c}</td>" for kind, c in zip(classes, row)) + "</tr>")
+    return "\n".join([*out, "</tbody></table></div>"])
+
+
+def marks_html(experiment, lines):
+    """What signs and words of the table mean, to stand right below it; those of a column that a narrow window leaves out with that column."""
+    found = marks(experiment, lines)
+    entries = "".join("<dt{0}>{1}</dt><dd{0}>{2}</dd>".format(' class="roomy"' if sign in MARKS else "", html.escape(sign), html.escape(text)) for sign, text in found)
+    return f'<dl class="marks">{entries}</dl>' if found else ""

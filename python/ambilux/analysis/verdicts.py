@@ -1,11 +1,13 @@
 """What the data say in words. One level for all statements of a table together, whatever they are about."""
 
 import math
+from functools import lru_cache
 from statistics import NormalDist
 
 from ambilux.analysis import efficiency, statistics, summary
 
 LEVEL = 0.01  # chance of a false statement among all of a table
+WEAK = 0.25  # half of the way from slope -1/2 to an error that does not fall: a test that cannot find this much is not one
 
 
 def family(lines):
@@ -43,6 +45,22 @@ def slope_p(line):
     return math.nan if line.slope is None else statistics.two_sided_p(line.slope.value, line.slope.error, summary.SLOPES["rmse"], line.slope_seeds)
 
 
+@lru_cache
+def standard_errors(level, degrees):
+    """statistics.detectable for one standard error."""
+    return statistics.detectable(level, degrees)
+
+
+def slope_power(line, lines):
+    """Departure of the slope from -1/2, up or down, that its test would have found (statistics.POWER)."""
+    return line.slope.error * standard_errors(limit(lines), line.slope_seeds - 1)
+
+
+def bias_power(line, lines):
+    """The same of the mean from the reference's."""
+    return line.bias.estimate.error * standard_errors(limit(lines), line.bias.degrees)
+
+
 def differs(line, lines):
     """Whether a run's efficiency differs from the base run's by more than chance."""
     return line.ratio is not None and line.ratio.trusted and line.ratio.p < limit(lines)
@@ -63,27 +81,35 @@ def best(lines, scene):
     return first
 
 
-def told(p, limit, seeds, found, none):
-    """What a test says: found; found by itself, but not at the level of the whole table; or nothing found."""
-    return found if p < limit else f"{none} at the level of the whole table, though the interval excludes it ({seeds} seeds)" if p < 0.05 else none
+def slope_said(line, lines):
+    p = slope_p(line)
+    if math.isnan(p):
+        return "slope: not tested (needs two seeds and two checkpoints above the noise of the reference)"
+    found = f"slope {line.slope.value:.3f} [{line.slope.low:.3f}, {line.slope.high:.3f}]"
+    if p < limit(lines):
+        return f"{found}: differs from −1/2 by more than chance"
+    power = slope_power(line, lines)
+    if power > WEAK:
+        return f"{found}: {line.slope_seeds} seeds cannot test it (they would show a departure from −1/2 by {power:.2g} or more)"
+    return f"{found}: no departure from −1/2 found{beside(p, line.slope_seeds)}; one by {power:.2g} would have been"
+
+
+def bias_said(line, lines):
+    if line.bias is None:
+        return "bias over seeds: not tested (needs two seeds)"
+    e = line.bias.estimate
+    known = "" if math.isfinite(line.reference_error) else " (the noise of the reference is unknown and counts as none)"
+    found = f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]"
+    if line.bias.p < limit(lines):
+        return f"{found}: more than chance and the noise of the reference explain{known}"
+    return f"{found}: no bias found{beside(line.bias.p, line.seeds)}; one of {bias_power(line, lines):.1e} would have been{known}"
+
+
+def beside(p, seeds):
+    """What an interval says that a test at the level of all statements does not."""
+    return f" at the level of all statements, though the 95 % interval of {seeds} seeds excludes it" if p < 0.05 else ""
 
 
 def verdicts(lines):
     """What the data say on slope and bias, in whole sentences, for (scene, run)."""
-    out = {}
-    for line in lines:
-        p = slope_p(line)
-        if math.isnan(p):
-            slope_said = "slope: not tested (needs two seeds and two checkpoints above the noise of the reference)"
-        else:
-            slope_said = (f"slope {line.slope.value:.3f} [{line.slope.low:.3f}, {line.slope.high:.3f}]: "
-                          + told(p, limit(lines), line.slope_seeds, "differs from −1/2 by more than chance", "no departure from −1/2 found"))
-        if line.bias is None:
-            bias_said = "bias over seeds: not tested (needs two seeds)"
-        else:
-            e = line.bias.estimate
-            known = "" if math.isfinite(line.reference_error) else " (the noise of the reference is unknown and counts as none)"
-            bias_said = (f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]: "
-                         + told(line.bias.p, limit(lines), line.seeds, "more than chance and the noise of the reference explain", "no bias found") + known)
-        out[line.scene, line.run] = (slope_said, f"{bias_said}; by its method {line.stated_bias}" if line.stated_bias else bias_said)
-    return out
+    return {(line.scene, line.run): (slope_said(line, lines), bias_said(line, lines) + (f"; by its method {line.stated_bias}" if line.stated_bias else "")) for line in lines}

@@ -18,7 +18,7 @@ def recorded(folder, others, mhz=lambda seed: 3000.0):
 def test_quiet_machines_get_no_remark(tmp_path):
     folder = synthetic.make(tmp_path / "r", scenes=("box",))
     (said,) = fairness.remarks(experiment.load(folder))
-    assert said.startswith("what else ran on the machine was not recorded")
+    assert said.startswith("the load of the machine was not recorded")
     assert list(fairness.remarks(recorded(folder, lambda name: 0.2))) == []
 
 
@@ -46,13 +46,13 @@ def test_what_was_made_again_and_what_stayed_disturbed_is_said(tmp_path):
     manifest["disturbed"] = [{"scene": "box", "run": "nee", "seed": 2, "why": "a sample took 1.40 times as long as with another seed", "made": 2}]
     (folder / "manifest.json").write_text(json.dumps(manifest))
     left, held = fairness.remarks(experiment.load(folder))  # that it was made again does not help
-    assert left.startswith("1 render was disturbed and not made again (repeats = 0), of 9;") and "1.40 times" in left
-    assert held == "clocks of the device were held down (thermal) during box nee seed 2"
+    assert left.startswith("of 9 renders, 1 was disturbed and not repeated (repeats = 0);") and "1.40 times" in left
+    assert held == "the device lowered its clocks (thermal) during box nee seed 2"
     manifest |= {"repeats": 1, "ranks_share": "ranks 0 and 1 on node share core 3"}
     (folder / "manifest.json").write_text(json.dumps(manifest))
     shared, left, _ = fairness.remarks(experiment.load(folder))
-    assert shared.startswith("ranks 0 and 1 on node share core 3: no time") and "not made again, of 9;" in left
+    assert shared.startswith("ranks 0 and 1 on node share core 3: all times") and "1 was disturbed and not repeated; " in left
     del manifest["disturbed"]
     (folder / "manifest.json").write_text(json.dumps(manifest | {"ranks_share": None}))
     again, _ = fairness.remarks(experiment.load(folder))
-    assert again.startswith("1 render was disturbed and made again") and again.endswith("box nee seed 2 (other processes held 40 % of the cores)")
+    assert again.startswith("1 render was disturbed and repeated") and again.endswith("box nee seed 2 (other processes held 40 % of the cores)")

@@ -228,8 +228,12 @@ def test_page_fits_a_narrow_window(page):
     # The plot is drawn anew in that width, so that its words keep their size, and a finger on an image that is shown whole moves the page.
     assert page.evaluate("(() => { const s = document.querySelector('.plot .space > svg'); return s.viewBox.baseVal.width / s.getBoundingClientRect().width; })()") == pytest.approx(1, abs=0.02)
     assert page.evaluate("getComputedStyle(document.querySelector('.viewer canvas')).touchAction") == "pan-y"
-    # Names stay in sight while a table is moved.
+    # The leading columns of the table fit; of all columns names stay in sight while it is moved.
     table = page.locator("table.results")
+    assert table.evaluate("t => t.offsetWidth <= t.parentElement.clientWidth")
+    assert not table.locator("th", has_text="slope").is_visible()
+    page.locator("#every-column").check()
+    assert table.locator("th", has_text="slope").is_visible() and table.evaluate("t => t.offsetWidth > t.parentElement.clientWidth")
     table.evaluate("t => { t.parentElement.scrollLeft = 1e4; }")
     box = table.locator("tbody td:nth-child(2)").first.bounding_box()
     assert 0 <= box["x"] < 60

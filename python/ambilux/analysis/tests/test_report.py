@@ -161,6 +161,21 @@ def test_verdicts_say_what_the_data_say(tmp_path):
     assert len(marked) == 1 and "& mis" in marked[0]
 
 
+def test_silence_of_a_test_counts_only_where_it_could_have_spoken(tmp_path):
+    """Of checkpoints with 3 % of noise: four seeds tell what departure they would have shown, two cannot tell any."""
+    def change(line, luck=np.random.default_rng(3)):
+        cells = line.split(",")
+        cells[10] = cells[11] = f"{float(cells[11]) * math.exp(0.03 * luck.normal()):.9g}"
+        return ",".join(cells)
+
+    for seeds, words in (((1, 2, 3, 4), r"no departure from −1/2 found; one by 0\.\d+ would have been"), ((1, 2), r"2 seeds cannot test it \(they would show a departure from −1/2 by [\d.e+]+ or more\)")):
+        folder = synthetic.make(tmp_path / str(len(seeds)), scenes=("box",), seeds=seeds)
+        lines = summary.lines(experiment.load(edit(folder, tmp_path / f"noise{len(seeds)}", lambda rows: [rows[0], *map(change, rows[1:])])))
+        said = verdicts.verdicts(lines)["box", "naive"][0]
+        assert re.search(words, said), said
+        assert (verdicts.slope_power(lines[0], lines) <= verdicts.WEAK) == (len(seeds) == 4)
+
+
 def test_a_bias_that_the_method_states_is_told_and_takes_no_slope_for_a_fault(tmp_path):
     folder = synthetic.make(tmp_path / "r", scenes=("box",), seeds=(1, 2, 3, 4), spread=0.03)
 
@@ -174,7 +189,7 @@ def test_a_bias_that_the_method_states_is_told_and_takes_no_slope_for_a_fault(tm
     lines = summary.lines(data)
     assert {line.run: line.stated_bias for line in lines} == {"naive": "", "nee": "", "mis": "biased by a radius"}
     found = remarks.remarks(data, lines)
-    assert any("box, mis: biased by a radius, so that errors hold this bias" in r for r in found)
+    assert any("mis: biased by a radius, so that errors include this bias" == r.split(" and need")[0] for r in found)
     assert any("box, nee: the error falls with slope" in r for r in found)
     assert not any("box, mis: the error falls with slope" in r for r in found)
     assert verdicts.verdicts(lines)["box", "mis"][1].endswith("by its method biased by a radius")

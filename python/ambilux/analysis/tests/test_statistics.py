@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from ambilux.analysis import statistics as st
 
@@ -96,3 +97,11 @@ def test_two_sided_p_is_uniform_without_an_effect():
         assert abs((p < level).mean() - level) < 4 * math.sqrt(level * (1 - level) / 3000)
     assert math.isnan(st.two_sided_p(1.0, math.nan, 0, 1))
     assert st.two_sided_p(-0.5, 0.0, -0.5, 4) == 1 and st.two_sided_p(-0.4, 0.0, -0.5, 4) == 0
+
+
+@pytest.mark.parametrize(("level", "degrees"), [(0.05, 2), (1e-3, 5), (0.01, math.inf)])
+def test_a_detectable_departure_is_found_as_often_as_said(level, degrees):
+    rng, count = np.random.default_rng(5), 20000
+    error = np.sqrt(rng.chisquare(degrees, count) / degrees) if math.isfinite(degrees) else np.ones(count)
+    found = (np.abs(rng.normal(size=count) + st.detectable(level, degrees)) > student.isf(level / 2, degrees) * error).mean()
+    assert found == pytest.approx(st.POWER, abs=0.01)  # a standard deviation of 0.002
