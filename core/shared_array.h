@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/huge_pages.h"
+
 namespace ambilux {
 
 /// A vector whose copies share their memory: one that is changed while others hold it gets memory of its own first.
@@ -87,8 +89,14 @@ private:
     std::vector<T>& own() {
         if (!all_)
             all_ = std::make_shared<std::vector<T>>();
-        else if (all_.use_count() > 1 || all_->size() > size_)
-            all_ = std::make_shared<std::vector<T>>(all_->begin(), all_->begin() + ptrdiff_t(size_));
+        else if (all_.use_count() > 1 || all_->size() > size_) {
+            // As large as what it departs from, which is what most changes lead to.
+            auto copy = std::make_shared<std::vector<T>>();
+            copy->reserve(all_->size());
+            use_huge_pages(copy->data(), all_->size() * sizeof(T));
+            copy->assign(all_->begin(), all_->begin() + ptrdiff_t(size_));
+            all_ = std::move(copy);
+        }
         return *all_;
     }
 

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <boost/math/special_functions/legendre.hpp>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
+#include "core/parallel.h"
 #include "scene/view.h"
 
 namespace ambilux {
@@ -131,11 +134,11 @@ inline float fresnel_diffuse_reflectance(float eta) {
 /// index.
 inline void rough_transmittance_table(Microfacets type, float alpha, float ior, float* out) {
     static const precompute::Quadrature q(80);
-    for (uint32_t i = 0; i < kTransmittanceTableSize; ++i) {
+    parallel_for(kTransmittanceTableSize, [&](uint32_t i) {
         const double mu = double(i) / (kTransmittanceTableSize - 1);
         const auto albedo = precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q);
         out[i] = float(std::min(albedo.transmission, 1.0));  // phong's facets gain light
-    }
+    });
 }
 
 /// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal
@@ -144,13 +147,14 @@ inline void rough_transmittance_table(Microfacets type, float alpha, float ior, 
 inline float rough_internal_reflectance(Microfacets type, float alpha, float ior) {
     static const precompute::Quadrature q(64);
     const uint32_t n = kTransmittanceTableSize;
-    double sum = 0;
-    for (uint32_t i = 1; i < n; ++i) {
+    std::array<double, kTransmittanceTableSize> terms{};
+    parallel_for(n - 1, [&](uint32_t before) {
+        const uint32_t i = before + 1;
         const double mu = double(i) / (n - 1);
-        sum +=
+        terms[i] =
             mu * precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
-    }
-    return float(2 * sum / n);
+    });
+    return float(2 * std::accumulate(terms.begin(), terms.end(), 0.0) / n);
 }
 
 }  // namespace ambilux
