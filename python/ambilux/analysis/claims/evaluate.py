@@ -1,7 +1,8 @@
 """What the results of a claim say: our ratios with their intervals, and a verdict.
 
-A comparison is "reproduced" where its 95 % interval lies above what it must exceed (1 unless the claim says otherwise) and, where the paper states a value, reaches that; "in part"
-where the order holds and the interval ends below the published value; "not" where the interval lies below; "undecided" where it does neither, or where there is none.
+A comparison is "reproduced" where its 95 % interval lies above what it must exceed (1 unless the claim says otherwise)
+and, where the paper states a value, reaches that; "in part" where the order holds and the interval ends below the
+published value; "not" where the interval lies below; "undecided" where it does neither, or where there is none.
 """
 
 import math
@@ -17,7 +18,7 @@ OVER = "pairs of turns"
 
 @dataclass(frozen=True)
 class Found:
-    """One comparison. measures: {one of registry.MEASURES: heavy_tails.Judged}, what was measured of them; says: one of SAYS, why: in words."""
+    """One comparison. measures: {of registry.MEASURES: heavy_tails.Judged}; says: one of SAYS; why: in words."""
 
     compare: registry.Compare
     measures: dict
@@ -27,7 +28,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Outcome:
-    """verdict: one of SAYS, or "not run". evidence: a run at full size, on a device where the claim needs one. left_out: names of scenes that were not there."""
+    """verdict: one of SAYS, or "not run". left_out: names of scenes that were not there."""
 
     claim: registry.Claim
     status: dict
@@ -40,18 +41,22 @@ class Outcome:
 
     @property
     def evidence(self):
+        """Whether it was run at full size, on a device where the claim needs one."""
         return bool(self.found) and not self.status["small"]
 
 
 def equal_samples(data, scene, names):
     """Judged of the second run's error over the first one's, at the last checkpoint in samples that all runs have."""
     sets = [set(data.checkpoints(scene, r, "spp")) for r in data.runs if data.select(scene, r)]
-    if not sets or not (common := set.intersection(*sets)):
+    common = set.intersection(*sets) if sets else set()
+    if not common:
         return None
-    rows = [data.select(scene, name, max(common)) for name in names]
-    over_batches = [efficiency.of_batches(data, scene, name, data.metric, r) for name, r in zip(names, rows)]
-    over_seeds = [efficiency.of_seeds(r, data.metric) for r in rows]
-    works = [[b and replace(b, seconds=None), replace(s, rows=s.rows[:, :1])] for b, s in zip(over_batches, over_seeds)]
+    works = []
+    for name in names:
+        rows = data.select(scene, name, max(common))
+        batches = efficiency.of_batches(data, scene, name, data.metric, rows)
+        seeds = efficiency.of_seeds(rows, data.metric)
+        works.append((batches and replace(batches, seconds=None), replace(seeds, rows=seeds.rows[:, :1])))
     return efficiency.lead(*summary.ratios(*works, names[1]))
 
 
@@ -60,9 +65,11 @@ def of_experiment(claim, data, compare):
     scene, names = compare.scene, (compare.run, compare.over)
     if claim.measure == "of rates":
         return {"of rates": same_estimator.time_ratio(data, scene, *names)}
-    at_time = summary.ratio_over(data, scene, *names) if data.last_common_checkpoint(scene) is not None and "seconds" in data.budgets else None
-    found = {"at equal time": at_time, "at equal samples": equal_samples(data, scene, names)}
-    return {measure: efficiency.root(j) if claim.error == "rmse" else j for measure, j in found.items() if j is not None}
+    found = {"at equal samples": equal_samples(data, scene, names)}
+    if "seconds" in data.budgets and data.last_common_checkpoint(scene) is not None:
+        found["at equal time"] = summary.ratio_over(data, scene, *names)
+    root = efficiency.root if claim.error == "rmse" else lambda j: j
+    return {measure: root(j) for measure, j in found.items() if j is not None}
 
 
 def rate(bench, batch, kernel):
@@ -85,7 +92,7 @@ def of_bench(claim, out, compare):
     if not pairs:
         return {}, read
     e = statistics.ratio_of_pairs(*zip(*pairs))
-    judged = heavy_tails.Judged(e.value, e.low, e.high, math.nan, OVER, len(pairs)) if len(pairs) > 1 else heavy_tails.unknown(e.value, OVER, 1, "1 turn")
+    judged = heavy_tails.Judged(e.value, e.low, e.high, math.nan, OVER, len(pairs), "" if len(pairs) > 1 else "1 turn")
     return {"of rates": judged}, read
 
 
@@ -100,39 +107,37 @@ def said(compare, j):
     if not j.low > compare.above:
         return "undecided", f"{tables.interval(j)} holds {compare.above:g}"
     if compare.published and j.high < compare.published[0]:
-        return "in part", f"{tables.interval(j)} is above {compare.above:g} and ends below the published {compare.published[0]:g}"
-    return "reproduced", f"{tables.interval(j)}"
-
-
-def found_of(claim, measures, compare):
-    return Found(compare, measures, *said(compare, measures.get(claim.measure)))
+        return "in part", f"{tables.interval(j)} ends below the published {compare.published[0]:g}"
+    return "reproduced", tables.interval(j)
 
 
 def verdict(found):
-    """(one of SAYS, why): that of all comparisons where they agree; "in part" where some hold."""
+    """(one of SAYS, why): that of all comparisons where they agree; else "in part" where some hold, and "not"."""
     every = [f.says for f in found]
-    counts = ", ".join(f"{every.count(s)} {s}" for s in SAYS if s in every)
     holds = {"reproduced", "in part"} & set(every)
-    said_all = every[0] if len(set(every)) == 1 else "in part" if holds else "not" if "not" in every else "undecided"
-    return said_all, f"of {len(every)} comparisons {counts}" if len(every) > 1 else found[0].why
+    together = every[0] if len(set(every)) == 1 else "in part" if holds else "not"
+    counts = ", ".join(f"{every.count(s)} {s}" for s in SAYS if s in every)
+    return together, f"of {len(every)} comparisons {counts}" if len(every) > 1 else found[0].why
+
+
+def measured(claim, out):
+    """({compare: measures} of scenes that are there, Experiment or None, what benches wrote)."""
+    if claim.experiment:
+        data = experiments.load(run.results(out, claim))
+        return {c: of_experiment(claim, data, c) for c in claim.compares if c.scene in data.scenes}, data, ()
+    found = {c: of_bench(claim, out, c) for c in claim.compares}
+    return {c: m for c, (m, read) in found.items() if read}, None, tuple(b for _, read in found.values() for b in read)
 
 
 def outcome(claim, out):
     """What the folder `out` holds of a claim."""
     status = run.status(out, claim)
     if status["state"] != "run":
-        reasons = {"dry run": "a dry run: it needs a device", "failed": f"a command failed: {status['message']}", "not run": "nothing was run yet"}
-        return Outcome(claim, status, (), "not run", reasons[status["state"]])
-    data, benches = None, ()
-    if claim.experiment:
-        data = experiments.load(run.results(out, claim))
-        there = {c: of_experiment(claim, data, c) for c in claim.compares if c.scene in data.scenes}
-    else:
-        measured = {c: of_bench(claim, out, c) for c in claim.compares}
-        there = {c: measures for c, (measures, read) in measured.items() if read}
-        benches = tuple(b for _, read in measured.values() for b in read)
+        reasons = {"dry run": "a dry run, since it needs a device", "failed": f"a command failed: {status['message']}"}
+        return Outcome(claim, status, (), "not run", reasons.get(status["state"], "nothing was run yet"))
+    there, data, benches = measured(claim, out)
     left_out = tuple(dict.fromkeys(c.scene for c in claim.compares if c not in there))
-    found = tuple(found_of(claim, measures, c) for c, measures in there.items())
+    found = tuple(Found(c, m, *said(c, m.get(claim.measure))) for c, m in there.items())
     if not found:
         return Outcome(claim, status, (), "not run", f"none of its scenes is there: {', '.join(left_out)}", left_out)
     return Outcome(claim, status, found, *verdict(found), left_out, data, benches)

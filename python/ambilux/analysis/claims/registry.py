@@ -1,6 +1,6 @@
-"""Claims as their files state them: every NAME.claim.toml of a folder (docs/experiments.md, "Claims"). Needs Python's standard library alone.
+"""Claims as their files state them: every NAME.claim.toml of a folder (docs/extending.md, "A claim of a paper").
 
-What is wrong with a file is an InputError that names the file and the key.
+Needs Python's standard library alone. What is wrong with a file is an InputError that names the file and the key.
 """
 
 import os
@@ -11,31 +11,35 @@ from pathlib import Path
 from ambilux.analysis.experiment import InputError, settings_of
 
 ENDING = ".claim.toml"
-FORMS, MEASURES = ("ratio", "ranking"), ("at equal time", "at equal samples", "of rates")
-KINDS = [f"{form} {measure}" for form in FORMS for measure in MEASURES]
+MEASURES = ("at equal time", "at equal samples", "of rates")
+KINDS = [f"{form} {measure}" for form in ("ratio", "ranking") for measure in MEASURES]
 ERRORS = ("mse", "rmse")  # what a ratio of errors is of: the metric of the experiment, or the root of it
-NAMES = {str: "a text", list: "a list", dict: "a table", bool: "true or false", int: "a whole number", (int, float): "a number", (int, float, list): "a number, or the two ends of a range"}
 NUMBER, RANGE = (int, float), (int, float, list)
+NAMES = {str: "a text", list: "a list", dict: "a table", bool: "true or false", int: "a whole number",
+         NUMBER: "a number", RANGE: "a number, or the two ends of a range"}
 REQUIRED = {"title": str, "paper": str, "where": str, "states": str, "kind": str, "differs": list, "compare": list}
 OPTIONAL = {"doi": str, "error": str, "experiment": str, "bench": dict, "device": bool, "picture": str, "make": list}
 
 
 @dataclass(frozen=True)
 class Compare:
-    """`run` over `over` on a scene: how many times as good. published: ends of the range that the paper states, None for a ranking. above: what the ratio must exceed."""
+    """`run` over `over` on a scene: how many times as good. published: ends of the range that the paper states, None
+    for a ranking. above: what the ratio must exceed. batch: of rays, of a bench."""
 
     scene: str
     run: str
     over: str
     published: tuple | None = None
     above: float = 1.0
-    batch: str = ""  # of rays, of a bench
+    batch: str = ""
 
 
 @dataclass(frozen=True)
 class BenchRun:
-    arguments: tuple  # of `ambilux bench rays SCENE`
-    kernel: str = ""  # of the rows of a batch; empty: the first, which is what renders use
+    """`ambilux bench rays SCENE arguments`. kernel: of the rows of a batch; empty: the first, which renders use."""
+
+    arguments: tuple
+    kernel: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,14 +101,16 @@ def texts(place, key, values):
 
 
 def compare_of(place, table, kind):
-    fields_of(place, table, {"scene": str, "run": str, "over": str}, {"published": RANGE, "above": NUMBER, "batch": str})
-    published = table.get("published")
+    required, optional = {"scene": str, "run": str, "over": str}, {"published": RANGE, "above": NUMBER, "batch": str}
+    published = fields_of(place, table, required, optional).get("published")
     if (published is not None) != kind.startswith("ratio"):
         raise InputError(f"{place}: a ratio has 'published', a ranking has none")
+    if published is None:
+        return Compare(**table)
     ends = published if isinstance(published, list) else [published, published]
-    if published is not None and not (len(ends) == 2 and all(isinstance(e, NUMBER) for e in ends) and 0 < ends[0] <= ends[1]):
+    if len(ends) != 2 or not all(isinstance(e, NUMBER) for e in ends) or not 0 < ends[0] <= ends[1]:
         raise InputError(f"{place}: 'published' must be a positive number, or the two ends of a range")
-    return Compare(**{**table, "published": None if published is None else tuple(ends)})
+    return Compare(**{**table, "published": tuple(ends)})
 
 
 def bench_of(place, table):
@@ -113,7 +119,8 @@ def bench_of(place, table):
     for name, run in table["runs"].items():
         fields_of(f"{place} run '{name}'", run, {"arguments": list}, {"kernel": str})
         runs[name] = BenchRun(texts(place, "arguments", run["arguments"]), run.get("kernel", ""))
-    return Bench(table["turns"], {name: str(path) for name, path in table["scenes"].items()}, runs)
+    texts(place, "scenes", list(table["scenes"].values()))
+    return Bench(table["turns"], table["scenes"], runs)
 
 
 def names_in(path):
@@ -127,16 +134,18 @@ def names_in(path):
         raise InputError(f"{path}: is no configuration of an experiment: {e}") from None
 
 
-def check_names(file, claim):
-    scenes, runs = names_in(claim.experiment) if claim.experiment else (list(claim.bench.scenes), list(claim.bench.runs))
+def check_names(claim):
+    """Refuses scenes and runs that the experiment or the bench does not have."""
+    bench = claim.bench
+    scenes, runs = (list(bench.scenes), list(bench.runs)) if bench else names_in(claim.experiment)
     for c in claim.compares:
-        one_of(file, "scene", c.scene, scenes)
+        one_of(claim.file, "scene", c.scene, scenes)
         for run in (c.run, c.over):
-            one_of(file, "run", settings_of(run)[0], runs)
-        if bool(c.batch) != bool(claim.bench):
-            raise InputError(f"{file}: 'batch' names rays of a bench, and belongs to one")
-    if claim.picture and claim.experiment:
-        one_of(file, "picture", claim.picture, scenes)
+            one_of(claim.file, "run", settings_of(run)[0], runs)
+        if bool(c.batch) != bool(bench):
+            raise InputError(f"{claim.file}: 'batch' names rays of a bench, and belongs to one")
+    if claim.picture:
+        one_of(claim.file, "picture", claim.picture, scenes)
 
 
 def read(file):
@@ -149,14 +158,17 @@ def read(file):
     name, kind = file.name.removesuffix(ENDING), one_of(file, "kind", table["kind"], KINDS)
     if "bench" in table and ("experiment" in table or not kind.endswith("of rates")):
         raise InputError(f"{file}: a bench is of rates, and has no experiment")
-    compares = tuple(compare_of(f"{file}: [[compare]] {i}", c, kind) for i, c in enumerate(table["compare"], 1))
-    if not compares:
-        raise InputError(f"{file}: compares nothing")
     bench = bench_of(f"{file}: [bench]", table["bench"]) if "bench" in table else None
-    claim = Claim(name, file, table["title"], table["paper"], table.get("doi", ""), table["where"], table["states"], kind, one_of(file, "error", table.get("error", "mse"), ERRORS),
-                  None if bench else file.parent / table.get("experiment", f"{name}.toml"), bench, compares, texts(file, "differs", table["differs"]), table.get("device", False),
-                  table.get("picture", ""), texts(file, "make", table["make"]) if "make" in table else ())
-    check_names(file, claim)
+    claim = Claim(
+        name, file, table["title"], table["paper"], table.get("doi", ""), table["where"], table["states"], kind,
+        one_of(file, "error", table.get("error", "mse"), ERRORS),
+        None if bench else file.parent / table.get("experiment", f"{name}.toml"), bench,
+        tuple(compare_of(f"{file}: [[compare]] {i}", c, kind) for i, c in enumerate(table["compare"], 1)),
+        texts(file, "differs", table["differs"]), table.get("device", False), table.get("picture", ""),
+        texts(file, "make", table["make"]) if "make" in table else ())
+    if not claim.compares:
+        raise InputError(f"{file}: compares nothing")
+    check_names(claim)
     return claim
 
 

@@ -1,4 +1,7 @@
-"""Runs claims: their experiments and benches, into one folder. Needs Python's standard library and the program. What was done is skipped, what was interrupted goes on."""
+"""Runs claims, their experiments and benches, into one folder. What was done stays, what was interrupted goes on.
+
+Needs Python's standard library and the program.
+"""
 
 import json
 import os
@@ -10,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ambilux.analysis.claims import registry
+
+NOTHING = {"state": "not run", "message": "", "seconds": 0, "small": False, "device": False, "version": "",
+           "commands": []}
 
 
 class Failed(Exception):
@@ -38,7 +44,8 @@ def called(command):
 
 
 def has_device(place):
-    return any(not d.get("problem") for d in json.loads(place.call("--quiet", "devices", "--json", "-")).get("devices") or [])
+    found = json.loads(place.call("--quiet", "devices", "--json", "-"))["devices"]
+    return any(not d["problem"] for d in found)
 
 
 def status_file(out, claim):
@@ -52,57 +59,60 @@ def results(out, claim):
 
 def bench_file(out, scene, run, turn):
     """Of one bench; claims with the same scene and arguments share it."""
-    return out / "bench" / (re.sub(r"[^\w.]+", "-", "_".join([scene, *run.arguments])) + f"_{turn}.json")
+    name = re.sub(r"[^\w.]+", "-", "_".join([scene, *run.arguments]))
+    return out / "bench" / f"{name}_{turn}.json"
 
 
 def experiment_arguments(claim, place):
-    folder = results(place.out, claim)
-    arguments = ["experiment", os.path.relpath(claim.experiment), "-o", os.path.relpath(folder), "--references", os.path.relpath(place.out / "references")]
-    return arguments + ["--reduced"] * place.small + ["--resume"] * (folder / "config.resolved.toml").is_file()
+    arguments = ["experiment", os.path.relpath(claim.experiment), "-o", os.path.relpath(results(place.out, claim)),
+                 "--references", os.path.relpath(place.out / "references")]
+    return arguments + ["--reduced"] * place.small
 
 
 def run_experiment(claim, place):
     """What is complete stays; a configuration that has changed since is refused."""
-    place.call("--quiet", *experiment_arguments(claim, place))
+    begun = (results(place.out, claim) / "config.resolved.toml").is_file()
+    place.call("--quiet", *experiment_arguments(claim, place), *["--resume"] * begun)
 
 
 def benches(claim, place):
     """(file, arguments of the program), turn by turn."""
+    different = {run.arguments: run for run in claim.bench.runs.values()}.values()
     for turn in range(1, claim.bench.turns + 1):
         for scene in claim.bench.scenes:
-            for run in {run.arguments: run for run in claim.bench.runs.values()}.values():
-                if path := registry.scene_path(claim, scene):
-                    yield bench_file(place.out, scene, run, turn), ["bench", "rays", os.path.relpath(path), *run.arguments]
+            if path := registry.scene_path(claim, scene):
+                for run in different:
+                    arguments = ["bench", "rays", os.path.relpath(path), *run.arguments]
+                    yield bench_file(place.out, scene, run, turn), arguments
 
 
 def run_benches(claim, place):
     for file, arguments in benches(claim, place):
         if not file.is_file():
             file.parent.mkdir(parents=True, exist_ok=True)
-            text = place.call(*arguments, "--json", "-")
-            file.with_suffix(".part").write_text(text)
-            file.with_suffix(".part").replace(file)
-
-
-def commands(claim, place):
-    """What a reader types."""
-    made = [" ".join(("python3", *claim.make))] if claim.make else []
-    asked = [a for _, a in benches(claim, place)] if claim.bench else [[a for a in experiment_arguments(claim, place) if a != "--resume"]]
-    return made + list(dict.fromkeys(" ".join(("ambilux", *map(str, a))) for a in asked))
+            part = file.with_suffix(".part")
+            part.write_text(place.call(*arguments, "--json", "-"))
+            part.replace(file)
 
 
 def dry_run(claim, place):
     if claim.experiment:
         place.call("experiment", claim.experiment, "--reduced", "--dry-run")
-    else:
-        for scene in claim.bench.scenes:
-            if path := registry.scene_path(claim, scene):
-                place.call("info", path)
+        return
+    for scene in claim.bench.scenes:
+        if path := registry.scene_path(claim, scene):
+            place.call("info", path)
+
+
+def commands(claim, place):
+    """What a reader types."""
+    made = [" ".join(("python3", *claim.make))] if claim.make else []
+    asked = [a for _, a in benches(claim, place)] if claim.bench else [experiment_arguments(claim, place)]
+    return made + list(dict.fromkeys(" ".join(("ambilux", *a)) for a in asked))
 
 
 def run(claim, place, device):
-    """Runs a claim and writes its status: state ("run", "dry run" or "failed"), message, seconds, small, device, version, commands."""
-    file = status_file(place.out, claim)
+    """Runs a claim. Writes and returns its status: the keys of NOTHING; state: "run", "dry run" or "failed"."""
     start, dry, message = time.monotonic(), claim.device and not device, ""
     try:
         if claim.make and not Path(claim.make[-1]).is_file():
@@ -110,12 +120,13 @@ def run(claim, place, device):
         (dry_run if dry else run_experiment if claim.experiment else run_benches)(claim, place)
     except Failed as e:
         message = str(e)
-    status = {"state": "failed" if message else "dry run" if dry else "run", "message": message, "seconds": round(time.monotonic() - start, 1), "small": place.small, "device": device,
+    status = {"state": "failed" if message else "dry run" if dry else "run", "message": message,
+              "seconds": round(time.monotonic() - start, 1), "small": place.small, "device": device,
               "version": place.call("--version").splitlines()[0], "commands": commands(claim, place)}
-    file.write_text(json.dumps(status, indent=1) + "\n")
+    status_file(place.out, claim).write_text(json.dumps(status, indent=1) + "\n")
     return status
 
 
 def status(out, claim):
     file = status_file(out, claim)
-    return json.loads(file.read_text()) if file.is_file() else {"state": "not run", "small": False, "device": False, "commands": [], "version": "", "message": "", "seconds": 0}
+    return json.loads(file.read_text()) if file.is_file() else NOTHING
