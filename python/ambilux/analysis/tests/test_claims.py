@@ -118,7 +118,8 @@ def test_what_did_not_run_is_not_left_out(tmp_path):
     assert "failed: no memory" in outcome_of(tmp_path, state="failed", message="no memory").why
     (claim,) = registry.load(write_claim(tmp_path / "claims"))
     assert evaluate.outcome(claim, tmp_path / "nothing").why == "nothing was run yet"
-    assert evaluate.counted([o, outcome_of(tmp_path)]) == "2 claims: 1 reproduced, 0 in part, 0 not, 0 undecided, 1 not run"
+    said = evaluate.counted([o, outcome_of(tmp_path)])
+    assert said == "2 claims: 1 reproduced, 0 in part, 0 not, 0 undecided, 1 not run"
 
 
 def test_rates_over_turns(tmp_path):
