@@ -45,16 +45,29 @@ class Outcome:
         return bool(self.found) and not self.status["small"]
 
 
+def is_biased(data, scene, names):
+    """Whether one of the runs says so: then batches, whose scatter holds no bias, tell nothing of its error."""
+    return any(r.stated_bias for name in names for r in data.select(scene, name))
+
+
+def equal_time(data, scene, names):
+    """Judged of the second run's error times time over the first one's, at the last checkpoint that all runs have."""
+    if not is_biased(data, scene, names):
+        return summary.ratio_over(data, scene, *names)
+    rows = [data.select(scene, name, data.last_common_checkpoint(scene)) for name in names]
+    return efficiency.ratio(*(efficiency.of_seeds(r, data.metric) for r in rows), names[1])
+
+
 def equal_samples(data, scene, names):
     """Judged of the second run's error over the first one's, at the last checkpoint in samples that all runs have."""
     sets = [set(data.checkpoints(scene, r, "spp")) for r in data.runs if data.select(scene, r)]
     common = set.intersection(*sets) if sets else set()
     if not common:
         return None
-    works = []
+    works, biased = [], is_biased(data, scene, names)
     for name in names:
         rows = data.select(scene, name, max(common))
-        batches = efficiency.of_batches(data, scene, name, data.metric, rows)
+        batches = None if biased else efficiency.of_batches(data, scene, name, data.metric, rows)
         seeds = efficiency.of_seeds(rows, data.metric)
         works.append((batches and replace(batches, seconds=None), replace(seeds, rows=seeds.rows[:, :1])))
     return efficiency.lead(*summary.ratios(*works, names[1]))
@@ -67,7 +80,7 @@ def of_experiment(claim, data, compare):
         return {"of rates": same_estimator.time_ratio(data, scene, *names)}
     found = {"at equal samples": equal_samples(data, scene, names)}
     if "seconds" in data.budgets and data.last_common_checkpoint(scene) is not None:
-        found["at equal time"] = summary.ratio_over(data, scene, *names)
+        found["at equal time"] = equal_time(data, scene, names)
     root = efficiency.root if claim.error == "rmse" else lambda j: j
     return {measure: root(j) for measure, j in found.items() if j is not None}
 

@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from ambilux.analysis import experiment
 from ambilux.analysis.claims import evaluate, page, registry, run
 from ambilux.analysis.experiment import InputError
 from ambilux.analysis.tests import synthetic
@@ -105,6 +107,17 @@ def test_a_published_value_decides_between_whole_and_part(tmp_path):
     assert root.found[0].measures["at equal time"].value == pytest.approx(2, rel=0.2)
 
 
+def test_batches_say_nothing_of_a_biased_run(tmp_path):
+    folder = synthetic.make(tmp_path / "c", scenes=("box",), runs=(("a", 0.5, 1.0), ("b", 1.0, 1.0)), seconds=(0.05, 0.2),
+                            reference_noise=0, outliers=1.1, batches=16)
+    data = experiment.load(folder)
+    measured = [evaluate.equal_time, evaluate.equal_samples]
+    assert [f(data, "box", ("a", "b")).over for f in measured] == ["batches", "batches"]
+    rows = [replace(r, stated_bias="a radius") if r.run == "b" else r for r in data.rows]
+    biased = replace(data, rows=rows, kept={})
+    assert [f(biased, "box", ("a", "b")).over for f in measured] == ["seeds", "seeds"]
+
+
 def test_comparisons_that_disagree_and_scenes_that_are_away(tmp_path):
     more = '[[compare]]\nscene = "box"\nrun = "b"\nover = "a"\n[[compare]]\nscene = "away"\nrun = "a"\nover = "b"\n'
     o = outcome_of(tmp_path, more=more)
@@ -163,7 +176,7 @@ def test_the_page_says_what_is_evidence(tmp_path):
     assert (tmp_path / "images" / "claims" / "c.png").stat().st_size > 1000
     small = page.markdown([outcome_of(tmp_path, small=True)], tmp_path / "none", tmp_path)
     assert "not run on a device; a small run says: reproduced" in small
-    assert "**reproduced**" not in small and not (tmp_path / "none").exists()
+    assert "Verdict: **" not in small and not (tmp_path / "none").exists()
 
 
 def test_the_projects_page_names_every_claim():
