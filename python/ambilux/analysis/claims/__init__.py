@@ -1,0 +1,1 @@
+"""Published claims beside what this program measures, by scripts/claims.sh (docs/claims.md)."""

@@ -1,0 +1,127 @@
+"""docs/claims.md: each claim with what the paper says, what was measured, the verdict, what differs, and the data."""
+
+import os
+import re
+
+import matplotlib.pyplot as plt
+
+from ambilux.analysis import captions, comparison, style, tables
+from ambilux.analysis.claims import evaluate
+
+HEAD = """# Published claims
+
+What papers say, beside what this program measures. Written by `scripts/claims.sh` from the files in {folder} and from
+results; do not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
+
+A ratio says how many times as good the first run of a comparison is: error times time of the other over its own *at
+equal time*, error over error *at equal samples*, rate over rate *of rates*; brackets are 95 % intervals, made as those
+of [experiments]({docs}experiments.md#how-numbers-are-made). With the measure that the paper uses a comparison is
+
+- **reproduced** where the interval lies above 1 and, where the paper states a value, reaches it,
+- **in part** where it lies above 1 and ends below the published value; of several comparisons, where some hold,
+- **not** where it lies below 1,
+- **undecided** where it holds 1, or where the data cannot support one.
+
+**A small run is no evidence.** It shows that the claim can be run; sizes, seeds and times are those of `--quick`.
+"""
+SHOWN = {"at equal time": "equal time [95 %]", "at equal samples": "equal samples [95 %]", "of rates": "rates [95 %]"}
+KEPT = ("Scenes", "Seeds", "Device", "Revision")
+
+
+def verdict_text(outcome):
+    if outcome.evidence:
+        return f"**{outcome.verdict}**" + ("" if outcome.status["device"] else " on a CPU")
+    return "not run on a device" + (f"; a small run says: {outcome.verdict}" if outcome.found else "")
+
+
+def ratio_text(j):
+    return "–" if j is None else tables.interval(j) + (f" ({j.doubt})" if j.doubt else "")
+
+
+def published_text(compare):
+    if compare.published is None:
+        return f"above {compare.above:g}"
+    low, high = compare.published
+    return tables.number(low) if low == high else f"{tables.number(low)} to {tables.number(high)}"
+
+
+def table(outcome):
+    """The comparisons, the measure that decides first."""
+    known = {m for f in outcome.found for m in f.measures}
+    measures = sorted(known, key=lambda m: (m != outcome.claim.measure, m))
+    yield "| " + " | ".join(["scene", "comparison", "published", *(SHOWN[m] for m in measures), "says"]) + " |"
+    yield "|" + " --- |" * (4 + len(measures))
+    for f in outcome.found:
+        c = f.compare
+        own = [tables.minus(ratio_text(f.measures.get(m))) for m in measures]
+        scene = f"{c.scene}, {c.batch}" if c.batch else c.scene
+        yield "| " + " | ".join([scene, f"{c.run} over {c.over}", published_text(c), *own, f.says]) + " |"
+
+
+def facts(outcome):
+    """Where, with what and from which data it was measured; commands as a reader types them."""
+    compares = [f.compare for f in outcome.found]
+    if outcome.data:
+        scenes = list(dict.fromkeys(c.scene for c in compares))
+        runs = list(dict.fromkeys(r for c in compares for r in (c.run, c.over)))
+        yield from (f for f in captions.data_behind(outcome.data, scenes, runs) if f.startswith(KEPT))
+    elif outcome.benches:
+        devices = ", ".join(dict.fromkeys(b["device"] for b in outcome.benches))
+        turns = outcome.claim.bench.turns
+        yield f"Device: {devices}; medians of {outcome.benches[0]['repetitions']} launches, {turns} turns"
+        yield f"Revision: {outcome.status['version']}"
+    yield from (f"Command: `{command}`" for command in outcome.status["commands"])
+
+
+def picture(outcome, folder):
+    """Draws the scene of the claim's key `picture` into `folder`; the file's name, or None: nothing to show."""
+    claim = outcome.claim
+    if not (outcome.evidence and outcome.data and claim.picture in outcome.data.scenes):
+        return None
+    try:
+        reference, shown = comparison.load(outcome.data, claim.picture)
+    except style.NotMade:
+        return None
+    runs = {r for f in outcome.found if f.compare.scene == claim.picture for r in (f.compare.run, f.compare.over)}
+    shown = [entry for entry in shown if entry[0] in runs]
+    insets = comparison.choose_insets(reference, [image for _, _, image in shown])
+    figure = comparison.draw(outcome.data, claim.picture, reference, shown, insets)
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / f"{claim.name}.png", dpi=150)
+    plt.close(figure)
+    return f"{claim.name}.png"
+
+
+def section(outcome, images, root):
+    claim = outcome.claim
+    link = f", [doi:{claim.doi}](https://doi.org/{claim.doi})" if claim.doi else ""
+    yield from [f"## {claim.title}", "", f"{claim.paper}{link}.", ""]
+    error = ", of RMSE" if claim.error == "rmse" else ""
+    yield from [f"Claim ({claim.where}): *{claim.states}* Kind: {claim.kind}{error}.", ""]
+    yield from [f"Verdict: {verdict_text(outcome)} ({outcome.why}).", ""]
+    if outcome.found:
+        yield from [*table(outcome), ""]
+    if outcome.left_out:
+        yield from [f"Left out, since they are not there: {', '.join(outcome.left_out)}.", ""]
+    if name := picture(outcome, images):
+        yield from [f"![{claim.title}: {claim.picture}]({os.path.relpath(images, root)}/{name})", ""]
+    yield from ["What differs from the paper:", "", *(f"- {d}" for d in claim.differs), ""]
+    was = "was" if outcome.found else "is"
+    yield from [f"How it {was} run:", "", *(f"- {f}" for f in facts(outcome)), ""]
+
+
+def markdown(outcomes, images, root):
+    """The page, for a file in the folder `root`; pictures go to the folder `images`."""
+    folder = os.path.relpath(outcomes[0].claim.file.parent, root)
+    full = [o for o in outcomes if o.evidence]
+    counts = f" Of these {evaluate.counted(full)}." if full else ""
+    docs = os.path.normpath(os.path.relpath("docs", root) + "/x")[:-1]
+    lines = [HEAD.format(folder=f"[{os.path.basename(folder)}]({folder})", docs=docs),
+             f"{len(outcomes)} claims, {len(full)} run at full size.{counts}", "",
+             "| claim | paper | kind | verdict |", "| --- | --- | --- | --- |"]
+    for o in outcomes:
+        anchor = re.sub(r"[^\w -]", "", o.claim.title.lower()).replace(" ", "-")
+        year = re.search(r"\b(?:19|20)\d\d\b", o.claim.paper)
+        authors = o.claim.paper[:year.end()] if year else o.claim.paper
+        lines.append(f"| [{o.claim.title}](#{anchor}) | {authors} | {o.claim.kind} | {verdict_text(o)} |")
+    return "\n".join([*lines, "", *(line for o in outcomes for line in section(o, images, root))]).rstrip("\n") + "\n"
