@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Rebuilds the published claims of experiments/claims and writes docs/claims.md (docs/experiments.md, "Claims").
+# Rebuilds the published claims of experiments/claims and writes docs/claims.md (docs/extending.md, "A claim of a paper").
 #   scripts/claims.sh [run|page] [--only NAME ...] [-o FOLDER] [--claims FOLDER]   both steps, or one: running needs the program and Python alone, on a device about 15 minutes
 #   scripts/claims.sh --quick                                                     every claim small, at most five minutes on two cores; the page goes to out/claims-quick
 #   scripts/claims.sh pack FOLDER FILE.tar.gz                                     what the page needs of results from elsewhere

@@ -15,7 +15,7 @@ results; do not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-pa
 
 A ratio says how many times as good the first run of a comparison is: error times time of the other over its own *at
 equal time*, error over error *at equal samples*, rate over rate *of rates*; brackets are 95 % intervals, made as those
-of [experiments]({docs}experiments.md#how-numbers-are-made). With the measure that the paper uses a comparison is
+of [analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
 
 - **reproduced** where the interval lies above 1 and, where the paper states a value, reaches it,
 - **in part** where it lies above 1 and ends below the published value; of several comparisons, where some hold,
