@@ -139,6 +139,11 @@ AMBILUX_HD LightGeometry light_from_point(const SurfacePoint& point, Vec3f refer
     return {d2, -dot(point.ng, s.wi)};
 }
 
+/// Density per solid angle of a place that was chosen with `pdf_area` per area.
+AMBILUX_HD float pdf_from_area(float pdf_area, const LightGeometry& light) {
+    return pdf_area * light.distance2 / light.cosine;
+}
+
 /// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by
 /// solid angle; everything else: by area.
 template <Features F>
@@ -158,7 +163,7 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
     s.prim = point.prim;
     s.opacity = area_opacity<F>(view, emitter, point.uv);
     s.radiance = area_radiance<F>(view, emitter, point.uv, s.opacity);
-    s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * light.distance2 / light.cosine;
+    s.pdf_sa = pdf_from_area(emitter.pick_probability * area_pdf_position(view, emitter, point.prim), light);
     return true;
 }
 
