@@ -30,7 +30,7 @@ class PlainLanes {
     static constexpr Features F = detail::kFeaturesOf<Stage>;
 
 public:
-    explicit PlainLanes(const Stage& stage) : stage_(stage), depth_(stage.wave.state->depth), on_(suits()) {}
+    explicit PlainLanes(const Stage& stage) : stage_(stage), depth_(stage.wave.state->depth), on_(suits()), sampled_(!all_plain()) {}
 
     void add(uint32_t i) {
         if (!on_ || !look_up(i)) return stage_(i);
@@ -57,9 +57,12 @@ private:
     bool suits() const {
         const auto& rules = stage_.rules;
         const SceneView& scene = stage_.scene;
-        if (!has_plain_lanes() || !scene.faces || rules.background_only || scene.emitter_count > 16 ||
-            depth_ >= rules.max_depth || depth_ >= rules.longest(Side::eye))
-            return false;
+        return has_plain_lanes() && scene.faces && !rules.background_only && depth_ < rules.max_depth &&
+               depth_ < rules.longest(Side::eye);
+    }
+    bool all_plain() const {
+        const SceneView& scene = stage_.scene;
+        if (scene.emitter_count > 16) return false;
         for (uint32_t e = 0; e < scene.emitter_count; ++e)
             if (!plain(scene.emitters[e])) return false;
         return true;
@@ -127,12 +130,35 @@ private:
         v_.radiance[k] = {radiance.x, radiance.y, radiance.z, e.pick_probability * area_pdf_position(scene, e, prim)};
     }
 
+    void sample_light(uint32_t k) {
+        const SceneView& scene = stage_.scene;
+        Face face;
+        Vec4f rows[3];
+        for (int row = 0; row < 3; ++row) rows[row] = v_.face[row][k];
+        memcpy(&face, rows, sizeof(rows));
+        SurfacePoint point;
+        detail::place_on_triangle(point, face.p0, face.p1, face.p2, v_.place[k].x, v_.place[k].y);
+        EmitterSample s;
+        LightsByPower::Pick pick;
+        const Vec4f u = {v_.u_light[0][k], v_.u_light[1][k], v_.u_light[2][k], v_.u_light[3][k]};
+        v_.light[1][k].w = 0.0f;
+        environment_[k] = false;
+        if (!sample_emitter_deferred<F>(scene, stage_.rules.lights, {point.p, face.ng}, u, s, pick)) return;
+        environment_[k] = is_environment<F>(scene, s.emitter);
+        const Rgb radiance = environment_[k] ? splat(1.0f) : s.radiance;
+        v_.light[0][k] = {s.p.x, s.p.y, s.p.z, s.distance};
+        v_.light[1][k] = {s.p_error.x, s.p_error.y, s.p_error.z, s.pdf_sa};
+        v_.light[2][k] = {s.ng.x, s.ng.y, s.ng.z, s.delta ? 1.0f : 0.0f};
+        v_.wi[k] = {s.wi.x, s.wi.y, s.wi.z, 0.0f};
+        v_.radiance[k] = {radiance.x, radiance.y, radiance.z, F.opacity ? sample_opacity(scene, s) : 1.0f};
+    }
+
     void next_event(uint32_t padded) {
         const auto& inner = stage_.vertices.inner;
         inner.record->count_items(count_, depth_);
         const FusedClock clock(inner.record);
-        for (uint32_t k = 0; k < count_; ++k) look_up_light(k);
-        plain_next_event(stage_.rules, v_, padded, smooth_);
+        for (uint32_t k = 0; k < count_; ++k) sampled_ ? sample_light(k) : look_up_light(k);
+        plain_next_event(stage_.rules, v_, padded, smooth_, sampled_);
         if (inner.seeds) plain_seeds(stage_.wave, v_, padded);
         for (uint32_t k = 0; k < count_; ++k) {
             const Vec4f value = v_.value[k], origin = v_.origin[k], direction = v_.to_light[k];
@@ -140,7 +166,7 @@ private:
             const CandidateItem c = {{value.x, value.y, value.z},
                                      float_bits(direction.w),
                                      {origin.x, origin.y, origin.z},
-                                     origin.w,
+                                     sampled_ && environment_[k] ? kTowardsEnvironment : origin.w,
                                      {direction.x, direction.y, direction.z},
                                      inner.seeds ? v_.seed[k] : 0,
                                      {},
@@ -160,10 +186,11 @@ private:
 
     const Stage& stage_;
     const uint32_t depth_;
-    const bool on_;
+    const bool on_, sampled_;
     uint32_t count_ = 0;
     bool smooth_ = false;
     uint32_t items_[PlainVertices::kMost];
+    bool environment_[PlainVertices::kMost];
     PlainVertices v_ = {};
 };
 

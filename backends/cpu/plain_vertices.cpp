@@ -73,21 +73,43 @@ inline void seeds_at(const Wave& wave, PlainVertices& v, uint32_t i) {
     v.seed[i] = RandomNumbers{wave.key(float_bits(v.throughput[i].w))}.shadow_seed(depth);
 }
 
-template <bool kSmooth>
-inline void next_event_at(const Rules<Mis>& rules, PlainVertices& b, uint32_t i) {
-    Vertex<Mis> v = vertex_of<kSmooth>(b, i);
+/// A place on a triangle of an emitter, seen from `reference_p`.
+inline LightGeometry sample_triangle(const PlainVertices& b, uint32_t i, Vec3f reference_p, EmitterSample& s) {
     Corners lamp = corners(b.light, i);
     Vec2f place = square_to_triangle({b.u_light[1][i], b.u_light[2][i]});
     SurfacePoint point = {};
     detail::place_on_triangle(point, lamp.p0, lamp.p1, lamp.p2, place.x, place.y);
     point.ng = lamp.ng;
-    EmitterSample s = {};
-    LightGeometry light = light_from_point(point, v.point.p, s);
+    LightGeometry light = light_from_point(point, reference_p, s);
     s.delta = false;
-    s.emitter = s.prim = 0;
     s.opacity = 1.0f;
     s.radiance = vector_of(b.radiance[i]);
     s.pdf_sa = pdf_from_area(b.radiance[i].w, light);
+    return light;
+}
+/// What was sampled.
+inline void load_sample(const PlainVertices& b, uint32_t i, EmitterSample& s) {
+    const Vec4f p = b.light[0][i], p_error = b.light[1][i], ng = b.light[2][i], wi = b.wi[i], radiance = b.radiance[i];
+    s.p = vector_of(p);
+    s.distance = p.w;
+    s.p_error = vector_of(p_error);
+    s.pdf_sa = p_error.w;
+    s.ng = vector_of(ng);
+    s.delta = ng.w != 0.0f;
+    s.wi = vector_of(wi);
+    s.radiance = vector_of(radiance);
+    s.opacity = radiance.w;
+}
+
+template <bool kSmooth, bool kSampled>
+inline void next_event_at(const Rules<Mis>& rules, PlainVertices& b, uint32_t i) {
+    Vertex<Mis> v = vertex_of<kSmooth>(b, i);
+    EmitterSample s = {};
+    LightGeometry light = {1.0f, 1.0f};
+    if constexpr (kSampled)
+        load_sample(b, i, s);
+    else
+        light = sample_triangle(b, i, v.point.p, s);
     Candidate<Mis> c = {};
     const SceneView none = {};
     const Vec4f throughput = b.throughput[i];
@@ -144,15 +166,18 @@ AMBILUX_LANES void plain_seeds(const Wave& wave, PlainVertices& v, uint32_t coun
     for (uint32_t i = 0; i < count; ++i) seeds_at(own, v, i);
 }
 
-AMBILUX_LANES void plain_next_event(const Rules<Mis>& rules, PlainVertices& v, uint32_t count, bool smooth) {
+template <bool kSmooth, bool kSampled>
+AMBILUX_LANES void next_events(const Rules<Mis>& rules, PlainVertices& v, uint32_t count) {
     const Rules<Mis> own = rules;
-    if (smooth) {
 #pragma omp simd
-        for (uint32_t i = 0; i < count; ++i) next_event_at<true>(own, v, i);
-    } else {
-#pragma omp simd
-        for (uint32_t i = 0; i < count; ++i) next_event_at<false>(own, v, i);
-    }
+    for (uint32_t i = 0; i < count; ++i) next_event_at<kSmooth, kSampled>(own, v, i);
+}
+
+void plain_next_event(const Rules<Mis>& rules, PlainVertices& v, uint32_t count, bool smooth, bool sampled) {
+    if (sampled)
+        smooth ? next_events<true, true>(rules, v, count) : next_events<false, true>(rules, v, count);
+    else
+        smooth ? next_events<true, false>(rules, v, count) : next_events<false, false>(rules, v, count);
 }
 
 AMBILUX_LANES void plain_scatter(const Rules<Mis>& rules, PlainVertices& v, uint32_t count, bool smooth) {

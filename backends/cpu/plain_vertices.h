@@ -20,8 +20,11 @@ struct alignas(64) PlainVertices {
     Row<Vec4f> face[4];      ///< Face
     Row<Vec4f> normal[3];    ///< of the vertices; in the first one whether there are any
     Row<Vec4f> reflectance;  ///< whether it is two-sided
-    Row<Vec4f> light[3];     ///< corners and normal of a triangle
-    Row<Vec4f> radiance;     ///< density per area with which the triangle's points are sampled
+    /// Corners and normal of a triangle; or place and distance, its error and the density, normal and whether it is a
+    /// delta.
+    Row<Vec4f> light[3];
+    Row<Vec4f> radiance;  ///< density per area with which points of the triangle are sampled; or chance to meet it
+    Row<Vec4f> wi;        ///< of samples
     // Computed.
     Row<float> u_light[4], u_scatter[4];
     Row<uint32_t> seed;     ///< of the shadow ray
@@ -38,8 +41,9 @@ bool has_plain_lanes();
 
 void plain_numbers(const Wave& wave, PlainVertices& v, uint32_t count);
 void plain_seeds(const Wave& wave, PlainVertices& v, uint32_t count);
-/// `smooth`: some have vertex normals.
-void plain_next_event(const Rules<UnidirectionalMis>& rules, PlainVertices& v, uint32_t count, bool smooth);
+/// `smooth`: some have vertex normals. `sampled`: emitters are, not places on their triangles.
+void plain_next_event(const Rules<UnidirectionalMis>& rules, PlainVertices& v, uint32_t count, bool smooth,
+                      bool sampled);
 void plain_scatter(const Rules<UnidirectionalMis>& rules, PlainVertices& v, uint32_t count, bool smooth);
 
 }  // namespace ambilux
