@@ -41,7 +41,7 @@ public:
     }
     template <class Stage>
     void run(const Stage& stage) {
-        if constexpr (detail::kHasPlainLanes<Stage>) {
+        if constexpr (PlainLanesOf<Stage>::kHas) {
             PlainLanes<Stage> lanes(stage);
             run_in_order<MaterialOrder>(stage, [&](uint32_t i) { lanes.add(i); }, [&] { lanes.run(); });
         } else {

@@ -39,13 +39,18 @@ AMBILUX_HD float area_pdf_position(const SceneView& view, const Emitter& emitter
     return view.tables[emitter.area_cdf + shape.primitive_count + 1 + (prim - shape.first_primitive)];
 }
 
+/// The primitive of the emitter that `u` in [0,1) chooses by area.
+AMBILUX_HD uint32_t area_pick_primitive(const SceneView& view, const Emitter& emitter, float u) {
+    const Shape& shape = view.shapes[emitter.shape];
+    uint32_t prim = shape.first_primitive;
+    if (emitter.area_cdf != kNone) prim += sample_cdf(view.tables + emitter.area_cdf, shape.primitive_count, u);
+    return prim;
+}
+
 /// Uniform point of the emitter's shape: `u` places it on a primitive that `u_primitive` chose by area.
 template <Features F>
 AMBILUX_HD SurfacePoint area_sample_point(const SceneView& view, const Emitter& emitter, float u_primitive, Vec2f u) {
-    const Shape& shape = view.shapes[emitter.shape];
-    uint32_t prim = shape.first_primitive;
-    if (emitter.area_cdf != kNone)
-        prim += sample_cdf(view.tables + emitter.area_cdf, shape.primitive_count, u_primitive);
+    const uint32_t prim = area_pick_primitive(view, emitter, u_primitive);
     Vec2f c;
     if (!F.has_quadrics() || view.is_triangle(prim)) {
         c = square_to_triangle(u);
