@@ -1,5 +1,5 @@
-// Plain vertices of eye subpaths side by side, for processors with vectors of 16 floats: what a vertex computes, between
-// what is looked up for it and what it pushes (plain_lanes.h).
+// Plain vertices of eye subpaths side by side, for processors with vectors of 16 floats: what a vertex computes,
+// between what is looked up for it and what it pushes (plain_lanes.h).
 #pragma once
 
 #include "queues/wave.h"
