@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "backends/cpu/plain_lanes.h"
 #include "backends/cpu/primitives.h"
 #include "queues/order.h"
 #include "queues/overflow.h"
@@ -40,7 +41,12 @@ public:
     }
     template <class Stage>
     void run(const Stage& stage) {
-        run_in_order<MaterialOrder>(stage, stage, [] {});
+        if constexpr (PlainLanesOf<Stage>::kHas) {
+            PlainLanes<Stage> lanes(stage);
+            run_in_order<MaterialOrder>(stage, [&](uint32_t i) { lanes.add(i); }, [&] { lanes.run(); });
+        } else {
+            run_in_order<MaterialOrder>(stage, stage, [] {});
+        }
     }
     template <class Stage>
     void trace(const Stage& stage) {

@@ -39,13 +39,18 @@ AMBILUX_HD float area_pdf_position(const SceneView& view, const Emitter& emitter
     return view.tables[emitter.area_cdf + shape.primitive_count + 1 + (prim - shape.first_primitive)];
 }
 
+/// The primitive of the emitter that `u` in [0,1) chooses by area.
+AMBILUX_HD uint32_t area_pick_primitive(const SceneView& view, const Emitter& emitter, float u) {
+    const Shape& shape = view.shapes[emitter.shape];
+    uint32_t prim = shape.first_primitive;
+    if (emitter.area_cdf != kNone) prim += sample_cdf(view.tables + emitter.area_cdf, shape.primitive_count, u);
+    return prim;
+}
+
 /// Uniform point of the emitter's shape: `u` places it on a primitive that `u_primitive` chose by area.
 template <Features F>
 AMBILUX_HD SurfacePoint area_sample_point(const SceneView& view, const Emitter& emitter, float u_primitive, Vec2f u) {
-    const Shape& shape = view.shapes[emitter.shape];
-    uint32_t prim = shape.first_primitive;
-    if (emitter.area_cdf != kNone)
-        prim += sample_cdf(view.tables + emitter.area_cdf, shape.primitive_count, u_primitive);
+    const uint32_t prim = area_pick_primitive(view, emitter, u_primitive);
     Vec2f c;
     if (!F.has_quadrics() || view.is_triangle(prim)) {
         c = square_to_triangle(u);
@@ -139,6 +144,11 @@ AMBILUX_HD LightGeometry light_from_point(const SurfacePoint& point, Vec3f refer
     return {d2, -dot(point.ng, s.wi)};
 }
 
+/// Density per solid angle of a place that was chosen with `pdf_area` per area.
+AMBILUX_HD float pdf_from_area(float pdf_area, const LightGeometry& light) {
+    return pdf_area * light.distance2 / light.cosine;
+}
+
 /// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by
 /// solid angle; everything else: by area.
 template <Features F>
@@ -158,7 +168,7 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
     s.prim = point.prim;
     s.opacity = area_opacity<F>(view, emitter, point.uv);
     s.radiance = area_radiance<F>(view, emitter, point.uv, s.opacity);
-    s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * light.distance2 / light.cosine;
+    s.pdf_sa = pdf_from_area(emitter.pick_probability * area_pdf_position(view, emitter, point.prim), light);
     return true;
 }
 
