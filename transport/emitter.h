@@ -50,12 +50,6 @@ AMBILUX_HD constexpr LightStart light_start(EmitterType type) {
 static_assert(kEmittersFrom<LightStart::surface> == bit(EmitterType::area));
 static_assert(kEmittersFrom<LightStart::environment> == (bit(EmitterType::constant) | bit(EmitterType::envmap)));
 
-/// False for a sample that cannot bring light.
-AMBILUX_HD bool may_bring_light(const EmitterSample& s) {
-    // Written so that NaN fails too.
-    return s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
-}
-
 /// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be
 /// replaced by emitter_sample_radiance once it is clear that the sample matters. True does not promise light then.
 /// `pick`: of the emitter.
@@ -81,7 +75,8 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, const Lights& lig
         default: break;
     }
     s.pdf_sa *= pick.over_power;
-    return lit && may_bring_light(s);
+    // Written so that NaN fails too.
+    return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
 }
 
 /// The same of emitters picked by power.

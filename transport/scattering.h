@@ -50,17 +50,9 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
     return l2 > 0.0f && l2 < kInfinity ? n * inverse_sqrt(l2) : point.ns;
 }
 
-/// Frame, sides and directions of `s` at `point` with the shading normal `n`, map included.
-AMBILUX_HD void place_scattering(Scattering& s, const SurfacePoint& point, Vec3f n, bool flip, Vec3f wi_world) {
-    s.frame = point.framed ? Frame{point.dpdu, cross(n, point.dpdu), n} : frame_from_normal_tangent(n, point.dpdu);
-    s.ng = point.ng;
-    if (flip) {
-        s.frame.n = -s.frame.n;
-        s.ng = -s.ng;
-    }
-    s.wi_world = wi_world;
-    s.wi = s.frame.to_local(wi_world);
-    s.flipped = flip;
+/// Frame of scattering at `point` with the shading normal `n`.
+AMBILUX_HD Frame scattering_frame(const SurfacePoint& point, Vec3f n) {
+    return point.framed ? Frame{point.dpdu, cross(n, point.dpdu), n} : frame_from_normal_tangent(n, point.dpdu);
 }
 
 /// Prepares scattering of a subpath that arrived from unit direction `wi_world` (pointing away from the surface). The
@@ -74,9 +66,17 @@ AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint
     Vec3f n = point.ns;
     if constexpr (F.bumps) n = perturbed_normal<F>(scene, record, point);
     Scattering s;
-    place_scattering(s, point, n, flip, wi_world);
+    s.frame = scattering_frame(point, n);
+    s.ng = point.ng;
+    if (flip) {
+        s.frame.n = -s.frame.n;
+        s.ng = -s.ng;
+    }
+    s.wi_world = wi_world;
+    s.wi = s.frame.to_local(wi_world);
     s.bsdf = resolve_bsdf<F>(scene, record, point.uv);
     s.record = index;
+    s.flipped = flip;
     s.map_rules = 0;
     if constexpr (F.map_rules) {
         s.map_rules = record.map_rules;

@@ -54,7 +54,15 @@ inline Vertex<Mis> vertex_of(const PlainVertices& b, uint32_t i) {
     v.offset = ray_offset(v.point.p, v.point.p_error, v.point.ng);
     const Vec3f wi = -vector_of(b.direction[i]);
     const bool flip = (b.reflectance[i].w != 0.0f) & (dot(face.ng, wi) < 0.0f);
-    place_scattering(v.scattering, v.point, v.point.ns, flip, wi);
+    v.scattering.frame = scattering_frame(v.point, v.point.ns);
+    v.scattering.ng = face.ng;
+    if (flip) {
+        v.scattering.frame.n = -v.scattering.frame.n;
+        v.scattering.ng = -v.scattering.ng;
+    }
+    v.scattering.wi_world = wi;
+    v.scattering.wi = v.scattering.frame.to_local(wi);
+    v.scattering.flipped = flip;
     v.scattering.bsdf.type = BsdfType::diffuse;
     v.scattering.bsdf.inputs.colors[0] = vector_of(b.reflectance[i]);
     v.scattering.map_rules = 0;
@@ -100,6 +108,18 @@ inline void load_sample(const PlainVertices& b, uint32_t i, EmitterSample& s) {
     s.radiance = vector_of(b.radiance[i]);
 }
 
+/// next_event() of the sample `light`.
+inline void next_event_of(const Rules<Mis>& rules, const Vertex<Mis>& v, Rgb throughput, const EmitterSample& light,
+                          Candidate<Mis>& c) {
+    const SceneView none = {};
+    if (!may_scatter(v.scattering, light.wi)) return;
+    const BsdfValue f = rules.directions.template evaluate<kPlain>(v, light.wi, TransportMode::radiance);
+    if (is_zero(f.value)) return;
+    c.value = next_event_value(throughput, f, light, false);
+    if (is_zero(c.value)) return;
+    complete_next_event<kPlain>(none, rules, v, 1, 1.0f, light, f, c);
+}
+
 template <bool kSmooth, bool kSampled>
 inline void next_event_at(const Rules<Mis>& rules, PlainVertices& b, uint32_t i) {
     Vertex<Mis> v = vertex_of<kSmooth>(b, i);
@@ -110,10 +130,10 @@ inline void next_event_at(const Rules<Mis>& rules, PlainVertices& b, uint32_t i)
     else
         light = sample_triangle(b, i, v.point.p, s);
     Candidate<Mis> c = {};
-    const SceneView none = {};
     const Vec4f throughput = b.throughput[i];
-    if ((light.cosine > 0.0f) & may_bring_light(s))
-        next_event_from<kPlain>(none, rules, v, vector_of(throughput), 1, 1.0f, s, c);
+    // As sample_emitter_deferred ends.
+    if ((light.cosine > 0.0f) & (s.pdf_sa > 0.0f) & (s.pdf_sa < kInfinity) & (max_component(s.radiance) > 0.0f))
+        next_event_of(rules, v, vector_of(throughput), s, c);
     b.value[i] = with_word(c.value, c.ratio);
     b.origin[i] = with_word(c.origin, c.tmax);
     b.to_light[i] = with_word(c.direction, throughput.w);

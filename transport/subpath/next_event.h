@@ -26,18 +26,10 @@ AMBILUX_HD bool complete_next_event(const SceneView& scene, const Rules<Mis>& ru
     return true;
 }
 
-/// The light of the emitter sample `light` at the vertex `z`. Parameters are those of next_event and
-/// complete_next_event.
-template <Features F, class Mis>
-AMBILUX_HD bool next_event_from(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& z, Rgb throughput,
-                                uint32_t depth, float over_power, const EmitterSample& light, Candidate<Mis>& c) {
-    if (!may_scatter(z.scattering, light.wi)) return false;
-    const BsdfValue f = rules.directions.template evaluate<F>(z, light.wi, TransportMode::radiance);
-    if (is_zero(f.value)) return false;
-    c.environment = is_environment<F>(scene, light.emitter);
-    c.value = throughput * f.value * ((c.environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
-    if (is_zero(c.value)) return false;  // as a condition of what is returned it costs nvcc ten registers
-    return complete_next_event<F>(scene, rules, z, depth, over_power, light, f, c);
+/// What the emitter sample `light` brings to an eye subpath of `throughput` whose BSDF has the value `f` for it; of an
+/// environment without its radiance (sample_emitter_deferred).
+AMBILUX_HD Rgb next_event_value(Rgb throughput, const BsdfValue& f, const EmitterSample& light, bool environment) {
+    return throughput * f.value * ((environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
 }
 
 /// The vertex `z` of an eye subpath of `depth` segments and `throughput` up to there samples an emitter with `u`. False
@@ -48,8 +40,15 @@ AMBILUX_HD bool next_event(const SceneView& scene, const Rules<Mis>& rules, cons
     EmitterSample light;
     typename Mis::Lights::Pick pick;
     if (!rules.next_event || !rules.wants(1, depth + 1)) return false;
-    return sample_emitter_deferred<F>(scene, rules.lights, {z.point.p, z.point.ng}, u, light, pick) &&
-           next_event_from<F>(scene, rules, z, throughput, depth, pick.over_power, light, c);
+    if (!sample_emitter_deferred<F>(scene, rules.lights, {z.point.p, z.point.ng}, u, light, pick) ||
+        !may_scatter(z.scattering, light.wi))
+        return false;
+    const BsdfValue f = rules.directions.template evaluate<F>(z, light.wi, TransportMode::radiance);
+    if (is_zero(f.value)) return false;
+    c.environment = is_environment<F>(scene, light.emitter);
+    c.value = next_event_value(throughput, f, light, c.environment);
+    if (is_zero(c.value)) return false;  // as a condition of what is returned it costs nvcc ten registers
+    return complete_next_event<F>(scene, rules, z, depth, pick.over_power, light, f, c);
 }
 
 }  // namespace ambilux
