@@ -26,8 +26,8 @@ if(NOT CMAKE_SCRIPT_MODE_FILE STREQUAL CMAKE_CURRENT_LIST_FILE)
 endif()
 cmake_minimum_required(VERSION 3.25)
 
-# Macros, storage of 32 bits and what has no floats of its own.
-set(kept_single core/hd.h core/half.h core/float32.h core/lane.h)
+# Macros, storage of 32 bits and what has no floats of its own, loops on all threads.
+set(kept_single core/hd.h core/half.h core/float32.h core/lane.h core/parallel.h)
 set(functions sqrt fabs fma copysign floor ceil exp expm1 log log1p erf sin cos asin acos atan2 __builtin_huge_val)
 string(REPLACE "|" ";" HEADERS "${HEADERS}")
 list(JOIN functions "|" functions)
