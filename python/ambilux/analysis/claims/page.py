@@ -19,7 +19,8 @@ first over that of the second. Brackets are 95 % intervals, made as those of
 [analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
 
 - **reproduced** where the interval lies above 1 and, where the paper states a value, reaches this value,
-- **in part** where the interval lies above 1 and ends below the published value; of several comparisons, where some hold,
+- **in part** where the interval lies above 1 and ends below the published value; of several comparisons, where some
+  hold,
 - **not** where the interval lies below 1,
 - **undecided** where the interval holds 1, or where the data cannot support an interval.
 
