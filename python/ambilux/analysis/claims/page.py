@@ -13,14 +13,16 @@ HEAD = """# Published claims
 What papers say, beside what this program measures. Written by `scripts/claims.sh` from the files in {folder} and from
 results; do not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
 
-A ratio says how many times as good the first run of a comparison is: error times time of the other over its own *at
-equal time*, error over error *at equal samples*, rate over rate *of rates*; brackets are 95 % intervals, made as those
-of [analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
+A ratio says how many times as good the first run of a comparison is as the second: *at equal time* error times time of
+the second over that of the first, *at equal samples* error of the second over that of the first, *of rates* rate of the
+first over that of the second. Brackets are 95 % intervals, made as those of
+[analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
 
-- **reproduced** where the interval lies above 1 and, where the paper states a value, reaches it,
-- **in part** where it lies above 1 and ends below the published value; of several comparisons, where some hold,
-- **not** where it lies below 1,
-- **undecided** where it holds 1, or where the data cannot support one.
+- **reproduced** where the interval lies above 1 and, where the paper states a value, reaches this value,
+- **in part** where the interval lies above 1 and ends below the published value; of several comparisons, where some
+  hold,
+- **not** where the interval lies below 1,
+- **undecided** where the interval holds 1, or where the data cannot support an interval.
 
 **A small run is no evidence.** It shows that the claim can be run; sizes, seeds and times are those of `--quick`.
 """
