@@ -90,7 +90,7 @@ private:
         for (int row = 0; row < 4; ++row) v_.face[row][k] = rows[row];
         v_.direction[k] = {ray.direction.x, ray.direction.y, ray.direction.z, bits_float(ray.bits.bits)};
         v_.throughput[k] = {ray.throughput.x, ray.throughput.y, ray.throughput.z, bits_float(ray.path)};
-        v_.place[k] = {end.u, end.v, 0.0f, 0.0f};
+        v_.place[k] = {end.u, end.v, float(F.bumps), 0.0f};
         v_.reflectance[k] = {r.x, r.y, r.z, float(material.two_sided)};
         v_.normal[0][k].w = 0.0f;
         if (shape.flags & kShapeHasNormals) look_up_normals(end.prim);

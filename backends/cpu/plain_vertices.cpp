@@ -54,7 +54,8 @@ inline Vertex<Mis> vertex_of(const PlainVertices& b, uint32_t i) {
     v.offset = ray_offset(v.point.p, v.point.p_error, v.point.ng);
     const Vec3f wi = -vector_of(b.direction[i]);
     const bool flip = (b.reflectance[i].w != 0.0f) & (dot(face.ng, wi) < 0.0f);
-    v.scattering.frame = scattering_frame(v.point, v.point.ns);
+    const float again = b.place[i].z != 0.0f ? inverse_sqrt(length_squared(v.point.ns)) : 1.0f;
+    v.scattering.frame = scattering_frame(v.point, v.point.ns * again);
     v.scattering.ng = face.ng;
     if (flip) {
         v.scattering.frame.n = -v.scattering.frame.n;

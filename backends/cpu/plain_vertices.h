@@ -18,7 +18,7 @@ struct alignas(64) PlainVertices {
     // Looked up. Words of whole numbers are bits of floats.
     Row<Vec4f> direction;    ///< of the ray; SubpathBits
     Row<Vec4f> throughput;   ///< and the slot
-    Row<Vec4f> place;        ///< barycentrics
+    Row<Vec4f> place;        ///< barycentrics; 1 where shading normals are made unit once more (perturbed_normal), or 0
     Row<Vec4f> face[4];      ///< Face
     Row<Vec4f> normal[3];    ///< of the vertices; with the first one 1 if there are any, and 0
     Row<Vec4f> reflectance;  ///< and 1 if it is two-sided, or 0

@@ -116,10 +116,10 @@ TEST_CASE("EXR: channels of any spelling, and of one layer, are colours") {
     const Texels layer = read({{"beauty.R", c.x}, {"beauty.G", c.y}, {"beauty.B", c.z}, {"depth.Z", 7}});
     check_texels(layer, c);
     CHECK(contains(joined(layer), "layer 'beauty'"));
-    CHECK(contains(joined(layer), "not used: depth.Z"));
+    CHECK(contains(joined(layer), "unused channels: depth.Z"));
     const Texels both = read({{"R", c.x}, {"G", c.y}, {"B", c.z}, {"albedo.R", 1}, {"albedo.G", 1}, {"albedo.B", 1}});
     check_texels(both, c);
-    CHECK(contains(joined(both), "not used: albedo.B, albedo.G, albedo.R"));
+    CHECK(contains(joined(both), "unused channels: albedo.B, albedo.G, albedo.R"));
     const Texels height = read({{"height", 0.3f}});
     check_texels(height, splat(0.3f));
     CHECK(contains(joined(height), "'height' is taken as grey"));

@@ -71,7 +71,7 @@ TEST_CASE("OBJ: faces of two corners are left out, and what is not used is named
     CHECK(mesh.faces.size() == 1);
     REQUIRE(mesh.notes.size() == 2);
     CHECK(contains(mesh.notes[0], "fewer than three corners are left out: 2"));
-    CHECK(contains(mesh.notes[1], "not used: 'l', 'p'"));
+    CHECK(contains(mesh.notes[1], "unused data: 'l', 'p'"));
     const Mesh colored = read_obj("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 5 5 5 1\nf 1 2 3\n", true);
     REQUIRE(colored.notes.size() == 1);
     CHECK(contains(colored.notes[0], "colours of vertices"));
@@ -119,7 +119,7 @@ TEST_CASE("OBJ: colours behind the places of vertices are the attribute vertex_c
     float texel[3];
     memcpy(texel, shown.texels.data() + shown.textures.at(0).offset, sizeof texel);
     check_rgb({texel[0], texel[1], texel[2]}, {1, 0.5f, 0}, 1e-6);
-    CHECK_FALSE(has_note(shown, "not used"));
+    CHECK_FALSE(has_note(shown, "unused data"));
     CHECK(has_note(scene(""), "the obj file has unused data: colours of vertices"));
 }
 
@@ -162,7 +162,7 @@ TEST_CASE("PLY: texture coordinates of corners divide the vertices where they di
     CHECK(is_at(fan.uvs[fan.faces[1][2]], 0, 1));
     CHECK(is_at(fan.uvs[fan.faces[2][2]], 0, 0));
     REQUIRE(fan.notes.size() == 1);
-    CHECK(contains(fan.notes[0], "not used: texnumber of element face"));
+    CHECK(contains(fan.notes[0], "unused data: texnumber of element face"));
     const auto message = [&](const std::string& first) -> std::string {
         try {
             read_ply("a.ply", file("", first, "3 0 1 2 6 0 0 1 0 1 1"), false);
@@ -223,7 +223,7 @@ TEST_CASE("PLY: coordinates and normals by all their names give the same mesh, w
     const Mesh both = read(properties("float", {"s", "t", "u", "v"}), {"7 7 0 0", "7 7 1 0", "7 7 1 1", "7 7 0 1"});
     CHECK(same(both, plain));
     REQUIRE(both.notes.size() == 1);
-    CHECK(contains(both.notes[0], "not used: s t of element vertex"));
+    CHECK(contains(both.notes[0], "unused data: s t of element vertex"));
 }
 
 TEST_CASE("PLY: colours by all their names are attributes; bytes are 255ths, words 65535ths") {
@@ -246,10 +246,10 @@ TEST_CASE("PLY: colours by all their names are attributes; bytes are 255ths, wor
         square(properties("uchar", {"red", "green", "blue", "alpha"}), {"1 2 3 4", "1 2 3 4", "1 2 3 4", "1 2 3 4"});
     const Mesh kept = read_ply("a.ply", text, false, {}, wanted), left = read_ply("a.ply", text, false);
     REQUIRE(kept.notes.size() == 1);
-    CHECK(contains(kept.notes[0], "not used: alpha of element vertex"));
+    CHECK(contains(kept.notes[0], "unused data: alpha of element vertex"));
     CHECK(left.attributes.empty());
     REQUIRE(left.notes.size() == 1);
-    CHECK(contains(left.notes[0], "not used: red green blue alpha of element vertex"));
+    CHECK(contains(left.notes[0], "unused data: red green blue alpha of element vertex"));
 }
 
 TEST_CASE("PLY: bytes of colours are sRGB in formats 0.x and linear, with a note, in format 3") {
@@ -276,7 +276,7 @@ TEST_CASE("PLY: bytes of colours are sRGB in formats 0.x and linear, with a note
     CHECK(has_note(newer, "integer colours are divided by 255"));
     // Nothing shows them here: they are named once, for both shapes.
     CHECK(has_note(scene("3.0.0", ""), "m.ply: the ply file has unused data: red green blue"));
-    CHECK_FALSE(has_note(newer, "not used"));
+    CHECK_FALSE(has_note(newer, "unused data"));
 }
 
 TEST_CASE("normals that are not finite count as none, with their number in a note, in every mesh file") {
