@@ -10,8 +10,8 @@
 #include "accel/faces.h"
 #include "accel/light_tree.h"
 #include "accel/shared_accels.h"
-#include "backends/cpu/executor.h"
 #include "backends/cpu/host_memory.h"
+#include "backends/cpu/plain_lanes.h"
 #include "backends/cpu/whole_executor.h"
 #include "backends/fast_cwbvh.h"
 #include "backends/fusion.h"
@@ -23,7 +23,7 @@ namespace ambilux {
 
 template <class Integrator, Features F>
 class CpuBackend {
-    static_assert(contract::Executor<CpuExecutor> && contract::WholeExecutor<CpuWholeExecutor>);
+    static_assert(contract::Executor<CpuLanesExecutor> && contract::WholeExecutor<CpuWholeExecutor>);
 
 public:
     using Maker = WaveMaker<Integrator, F, HostTracer>;
@@ -211,7 +211,7 @@ private:
                 w.state->samples = samples;
                 w.state->light_subpaths = samples * light_subpaths;
                 w.state->iteration = backend.iteration_of(first);
-                CpuExecutor exec(w.state, maker.view, w.order);
+                CpuLanesExecutor exec(w.state, maker.view, w.order);
                 body(exec, stages);
                 if (w.state->failed) return again({part.first_tile, part.tiles, sample, part.count - s}, body, w);
                 if constexpr (!Maker::kFilmWide)

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <utility>
 
-#include "backends/cpu/plain_lanes.h"
 #include "backends/cpu/primitives.h"
 #include "queues/order.h"
 #include "queues/overflow.h"
@@ -17,12 +16,20 @@
 
 namespace ambilux {
 
-class CpuExecutor {
+/// No stage is computed in lanes; backends/cpu/plain_lanes.h has some that are.
+template <class Stage>
+struct NoLanes {
+    static constexpr bool kHas = false;
+};
+
+/// `LanesOf`: of a stage, whether it is computed in lanes, and by what.
+template <template <class> class LanesOf>
+class CpuExecutorWith {
 public:
     static constexpr bool kHost = true;
 
-    explicit CpuExecutor(WaveState* state) : state_(state) {}
-    CpuExecutor(WaveState* state, const SceneView& scene, const OrderMemory& order)
+    explicit CpuExecutorWith(WaveState* state) : state_(state) {}
+    CpuExecutorWith(WaveState* state, const SceneView& scene, const OrderMemory& order)
         : state_(state), scene_(&scene), order_(order) {}
 
     template <class Stage>
@@ -41,8 +48,8 @@ public:
     }
     template <class Stage>
     void run(const Stage& stage) {
-        if constexpr (PlainLanesOf<Stage>::kHas) {
-            PlainLanes<Stage> lanes(stage);
+        if constexpr (LanesOf<Stage>::kHas) {
+            typename LanesOf<Stage>::Lanes lanes(stage);
             run_in_order<MaterialOrder>(stage, [&](uint32_t i) { lanes.add(i); }, [&] { lanes.run(); });
         } else {
             run_in_order<MaterialOrder>(stage, stage, [] {});
@@ -185,5 +192,6 @@ private:
     const SceneView* scene_ = nullptr;
     OrderMemory order_{};
 };
+using CpuExecutor = CpuExecutorWith<NoLanes>;
 
 }  // namespace ambilux

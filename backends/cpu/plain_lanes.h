@@ -1,21 +1,25 @@
 // Eye vertices of path in lanes: plain ones are gathered, computed side by side and pushed; others go one by one.
 #pragma once
 
+#include "backends/cpu/executor.h"
 #include "backends/cpu/plain_vertices.h"
 #include "queues/counter.h"
 #include "stages/eye_vertex.h"
 
 namespace ambilux {
 
+template <class Stage>
+class PlainLanes;
+
 /// Vertex stages that have lanes, and their features.
 template <class Stage>
-struct PlainLanesOf {
-    static constexpr bool kHas = false;
-};
+struct PlainLanesOf : NoLanes<Stage> {};
 template <Features F, class EmissionOut, class Out>
 struct PlainLanesOf<EyeVertex<F, UnidirectionalMis, EmissionOut, Clocked<NextEvent<F, UnidirectionalMis, Out>>>> {
     static constexpr bool kHas = F.has(BsdfType::diffuse) && F.has(PrimitiveType::triangle);
     static constexpr Features kFeatures = F;
+    using Lanes =
+        PlainLanes<EyeVertex<F, UnidirectionalMis, EmissionOut, Clocked<NextEvent<F, UnidirectionalMis, Out>>>>;
 };
 
 /// Runs `Stage` for items one after the other: add() them, and then run().
@@ -190,5 +194,6 @@ private:
     bool environment_[PlainVertices::kMost];
     PlainVertices v_ = {};
 };
+using CpuLanesExecutor = CpuExecutorWith<PlainLanesOf>;
 
 }  // namespace ambilux
