@@ -8,10 +8,13 @@
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <limits>
+#include <thread>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -74,6 +77,16 @@ struct Plane {
     }
 };
 
+/// Threads that compress blocks of rows side by side. One takes a second for 1920x1080 pixels of noise.
+int compressing_threads() {
+    static const int threads = [] {
+        const int n = std::clamp(int(std::thread::hardware_concurrency()), 1, 16);
+        Imf::setGlobalThreadCount(n);
+        return n;
+    }();
+    return threads;
+}
+
 std::string encode_planes(const std::string& path, uint32_t width, uint32_t height, const std::vector<Plane>& planes,
                           const Attributes& attributes) {
     ExrStream stream;
@@ -89,7 +102,7 @@ std::string encode_planes(const std::string& path, uint32_t width, uint32_t heig
                 frame.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(data + c)),
                                                   stride, stride * width));
             }
-        Imf::OutputFile file(stream, header);
+        Imf::OutputFile file(stream, header, compressing_threads());
         file.setFrameBuffer(frame);
         file.writePixels(int(height));
     } catch (const std::exception& e) {

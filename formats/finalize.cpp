@@ -85,55 +85,49 @@ double hat_integral(double x) {
     return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
 }
 
-/// Floats in whole records of four.
-size_t padded(size_t floats) { return (floats + 3) / 4 * 4; }
+/// What an environment's radiance is multiplied by: its largest component, and the rest of it, which alone decides
+/// where light comes from. Scales that differ by a grey factor have the same density to the bit.
+struct EnvironmentScale {
+    float factor;
+    Rgb tint;
 
-void append_environment(Scene& scene, Emitter& emitter, size_t height, const float* tables, size_t count) {
-    constexpr float kPadding[4] = {};
-    const size_t end = scene.tables.size(), rows_at = padded(end);
-    scene.tables.append(kPadding, rows_at - end);
-    scene.tables.append(tables, count);
-    emitter.env_rows = uint32_t(rows_at);
-    emitter.env_cells = uint32_t(rows_at + padded(2 * height));
-}
+    explicit EnvironmentScale(Rgb radiance)
+        : factor(max_component(radiance)), tint(factor > 0 ? radiance / factor : radiance) {
+        if (!(factor > 0)) factor = 1;
+    }
+};
 
-/// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get
-/// these tickets.
-void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, const std::vector<uint32_t>& row_tickets,
-                               const std::vector<uint32_t>& cell_tickets) {
-    // Records lie bitwise among the floats.
-    const size_t height = row_tickets.size(), cells_at = padded(2 * height);
-    std::vector<float> tables(cells_at + 4 * width * height);
-    const std::vector<AliasBucket> rows = make_alias_table(row_tickets);
-    memcpy(tables.data(), rows.data(), rows.size() * sizeof rows[0]);
-    static_assert(sizeof(EnvironmentCell) == 16);
+/// Makes the alias tables of an environment map whose rows, and cells within each row, get these tickets.
+void make_environment_tables(Scene& scene, size_t width, const std::vector<uint32_t>& row_tickets,
+                             const std::vector<uint32_t>& cell_tickets) {
+    const size_t height = row_tickets.size();
+    scene.environment_rows = make_alias_table(row_tickets);
+    std::vector<EnvironmentCell> cells(width * height);
     for (size_t y = 0; y < height; ++y) {
         const uint32_t* tickets = cell_tickets.data() + y * width;
         const double scale = double(row_tickets[y]) / kTickets * double(height) / kTickets * double(width);
         const std::vector<AliasBucket> buckets = make_alias_table({tickets, tickets + width});
-        std::vector<EnvironmentCell> cells(width);
         for (size_t x = 0; x < width; ++x)
-            cells[x] = {buckets[x].threshold, buckets[x].alias, float(scale * tickets[x]),
-                        float(scale * tickets[buckets[x].alias])};
-        memcpy(tables.data() + cells_at + 4 * y * width, cells.data(), width * sizeof cells[0]);
+            cells[y * width + x] = {buckets[x].threshold, buckets[x].alias, float(scale * tickets[x]),
+                                    float(scale * tickets[buckets[x].alias])};
     }
-    append_environment(scene, emitter, height, tables.data(), tables.size());
+    scene.environment_cells = std::move(cells);
 }
 
 /// The tables of the same environment map in `before`, if it has that.
-bool take_environment(Scene& scene, Emitter& emitter, const Scene* before) {
+bool take_environment(Scene& scene, const Emitter& emitter, const Scene* before) {
     if (!before || before->environment == kNone) return false;
     const Emitter& old = before->emitters[before->environment];
-    if (old.type != emitter.type || !(old.radiance.value == emitter.radiance.value)) return false;
+    const EnvironmentScale scale(emitter.radiance.value), old_scale(old.radiance.value);
+    if (old.type != emitter.type || !(old_scale.tint == scale.tint)) return false;
     const Texture &a = scene.textures[size_t(emitter.radiance.texture)],
                   &b = before->textures[size_t(old.radiance.texture)];
     const uint8_t *texels = scene.texels.data() + a.offset, *old_texels = before->texels.data() + b.offset;
     if (a.width != b.width || a.height != b.height || a.format != b.format) return false;
     if (texels != old_texels && memcmp(texels, old_texels, size_t(a.width) * a.height * bytes_of_texel(a.format)) != 0)
         return false;
-    const size_t cells_at = padded(2 * size_t(a.height));
-    append_environment(scene, emitter, a.height, before->tables.data() + old.env_rows,
-                       cells_at + 4 * size_t(a.width) * a.height);
+    scene.environment_rows = before->environment_rows;
+    scene.environment_cells = before->environment_cells;
     scene.environment_mean = before->environment_mean;
     return true;
 }
@@ -143,8 +137,9 @@ bool take_environment(Scene& scene, Emitter& emitter, const Scene* before) {
 /// centres: weights 1, 6, 1 over 8. Along v, texel rows lie at j/(height-1), so that the weights change from row to
 /// row; a row that barely reaches into a cell still gets 1/32, which bounds the ratio of radiance to density there. The
 /// density is zero only where the radiance is.
-void fill_environment(Scene& scene, Emitter& emitter) {
+void fill_environment(Scene& scene, const Emitter& emitter) {
     const Texture t = scene.textures[size_t(emitter.radiance.texture)];
+    const EnvironmentScale scale(emitter.radiance.value);
     const int64_t w = t.width, h = t.height;
     if (w > (1 << 20) || h > (1 << 20))
         throw input_error(scene.path, 0, "environment maps are limited to 2^20 rows and columns");
@@ -153,7 +148,7 @@ void fill_environment(Scene& scene, Emitter& emitter) {
     const SceneView view = scene.view();
     for (uint32_t y = 0; y < t.height; ++y)
         for (uint32_t x = 0; x < t.width; ++x)
-            lum.push_back(std::max(0.0f, luminance(emitter.radiance.value * load_texel(view, t, x, y))));
+            lum.push_back(std::max(0.0f, luminance(scale.tint * load_texel(view, t, x, y))));
 
     std::vector<double> row_means(size_t(h), 0.0), row_sums(size_t(h), 0.0);
     for (size_t i = 0; i < lum.size(); ++i) row_means[i / size_t(w)] += lum[i] / double(w);
@@ -182,7 +177,7 @@ void fill_environment(Scene& scene, Emitter& emitter) {
         std::copy(tickets.begin(), tickets.end(), cell_tickets.begin() + y * w);
         mean += exact_mean * solid_angle * double(w) / (4 * M_PI);
     }
-    append_environment_tables(scene, emitter, t.width, deal_tickets(row_sums), cell_tickets);
+    make_environment_tables(scene, t.width, deal_tickets(row_sums), cell_tickets);
     scene.environment_mean = mean;
 }
 
@@ -216,8 +211,8 @@ double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, const Recei
 double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
     return M_PI * to.both_sides * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter&, const Receivers& to) {
-    return M_PI * to.both_sides * scene.environment_mean;
+double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
+    return M_PI * to.both_sides * scene.environment_mean * EnvironmentScale(e.radiance.value).factor;
 }
 
 double power(ModelTag<CollimatedEmitter>, Scene& scene, Emitter& e, const Receivers&) {
@@ -364,7 +359,8 @@ void finalize_scene(Scene& scene, LightPicking light_picking, const Scene* befor
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
     // What rays read here and there.
     const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };
-    large_pages(scene.texels), large_pages(scene.tables), large_pages(scene.triangles), large_pages(scene.vertices);
+    large_pages(scene.texels), large_pages(scene.environment_cells), large_pages(scene.triangles);
+    large_pages(scene.vertices);
 }
 
 }  // namespace ambilux

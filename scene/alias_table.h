@@ -17,7 +17,7 @@ namespace ambilux {
 constexpr uint32_t kTicketBits = 24, kTickets = 1u << kTicketBits;
 
 /// Bucket of an alias table. Tickets of the bucket below `threshold` stand for the bucket's own index.
-struct AliasBucket {
+struct alignas(8) AliasBucket {
     uint32_t threshold, alias;
 };
 

@@ -16,6 +16,8 @@ SceneView Scene::view() const {
     v.emitters = emitters.data();
     v.emitter_cdf = emitter_cdf.data();
     v.tables = tables.data();
+    v.environment_rows = environment_rows.data();
+    v.environment_cells = environment_cells.data();
     v.vertex_count = uint32_t(vertices.size());
     v.triangle_count = uint32_t(triangles.size());
     v.quadric_count = uint32_t(quadrics.size());
@@ -45,7 +47,7 @@ uint64_t Scene::memory_bytes() const {
     const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
     return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(groups) + bytes(instances) + bytes(shapes) +
            bytes(materials) + bytes(bsdfs) + bytes(textures) + bytes(texels) + bytes(sort_keys) + bytes(emitters) +
-           bytes(emitter_cdf) + bytes(tables);
+           bytes(emitter_cdf) + bytes(tables) + bytes(environment_rows) + bytes(environment_cells);
 }
 
 }  // namespace ambilux

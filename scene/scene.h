@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/shared_array.h"
+#include "scene/alias_table.h"
 #include "scene/view.h"
 
 namespace ambilux {
@@ -49,8 +50,11 @@ struct Scene {
     std::vector<Emitter> emitters;
     std::vector<float> emitter_cdf;
     SharedArray<float> tables;
+    SharedArray<AliasBucket> environment_rows;  ///< SceneView::environment_rows
+    SharedArray<EnvironmentCell> environment_cells;
     uint32_t environment = kNone;
-    double environment_mean = 0;  ///< luminance of an environment map over the sphere, its factor included
+    double environment_mean =
+        0;  ///< luminance of an environment map over the sphere, over the largest component of its scale
     Vec3f bounds_center{};
     float bounds_radius = 0;
     Sensor sensor{};

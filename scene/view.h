@@ -125,7 +125,7 @@ struct Material {
 
 /// Bucket of the alias table of one row of an environment map, with the densities of both its cells, so that a single
 /// load serves sampling and density.
-struct EnvironmentCell {
+struct alignas(16) EnvironmentCell {
     uint32_t threshold, alias;  ///< as in AliasBucket; the alias is a column
     float32 pdf, alias_pdf;     ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's
                                 ///< probability included
@@ -147,11 +147,8 @@ struct Emitter {
     float one_minus_cos_cutoff;  ///< spot: of the angle where it ends; a cosine would lose the digits of narrow ones
     float cutoff, beam_width;    ///< spot: angles to the axis in radians
                                  ///< projector: tangents of half the field of view along x and y
-    // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and
-    // a piecewise-constant density over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
-    uint32_t env_rows;   ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes
-    uint32_t env_cells;  ///< alias table of the cells of each row: height rows of width EnvironmentCells in tables,
-                         ///< aligned to 16 bytes
+    // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y);
+    // its density lies in SceneView::environment_rows and environment_cells
 };
 
 // ---- sensor ----
@@ -180,6 +177,7 @@ struct Sensor {
 /// Materials that hits are told apart by when they are sorted.
 constexpr uint32_t kMostSortKeys = 0xfffe;
 
+struct AliasBucket;
 struct LightTreeView;
 
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.
@@ -196,6 +194,9 @@ struct SceneView {
     const Emitter* emitters;
     const float32* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
     const float32* tables;
+    // Of an environment map, a piecewise-constant density over width by height cells (transport/emitter/envmap.h):
+    const AliasBucket* environment_rows;       ///< alias table of the rows: height buckets
+    const EnvironmentCell* environment_cells;  ///< alias table of the cells of each row: height rows of width
     const Face* faces =
         nullptr;  ///< per triangle, on a host that renders; null: made of its vertices wherever asked for
     uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count,

@@ -15,7 +15,9 @@ DeviceScene::DeviceScene(const Scene& scene, std::shared_ptr<const HostTexels> t
       host_texels_(std::move(texels)), sort_keys_(scene.sort_keys, "sort keys on the device"),
       emitters_(scene.emitters, "emitters on the device"),
       emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
-      tables_(scene.tables, "tables on the device"), view_(scene.view()) {
+      tables_(scene.tables, "tables on the device"),
+      environment_rows_(scene.environment_rows, "density of the environment on the device"),
+      environment_cells_(scene.environment_cells, "density of the environment on the device"), view_(scene.view()) {
     view_.vertices = vertices_.data();
     view_.triangles = triangles_.data();
     view_.quadrics = quadrics_.data();
@@ -30,12 +32,15 @@ DeviceScene::DeviceScene(const Scene& scene, std::shared_ptr<const HostTexels> t
     view_.emitters = emitters_.data();
     view_.emitter_cdf = emitter_cdf_.data();
     view_.tables = tables_.data();
+    view_.environment_rows = environment_rows_.data();
+    view_.environment_cells = environment_cells_.data();
 }
 
 uint64_t DeviceScene::bytes() const {
     return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + groups_.bytes() + instances_.bytes() +
            shapes_.bytes() + materials_.bytes() + bsdfs_.bytes() + textures_.bytes() + texels_.bytes() +
-           sort_keys_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
+           sort_keys_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes() + environment_rows_.bytes() +
+           environment_cells_.bytes();
 }
 
 DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays)

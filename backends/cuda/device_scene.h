@@ -46,6 +46,8 @@ private:
     DeviceBuffer<uint16_t> sort_keys_;
     DeviceBuffer<Emitter> emitters_;
     DeviceBuffer<float> emitter_cdf_, tables_;
+    DeviceBuffer<AliasBucket> environment_rows_;
+    DeviceBuffer<EnvironmentCell> environment_cells_;
     SceneView view_;
 };
 

@@ -122,7 +122,8 @@ uint64_t shared_bytes(const LoadedScene& a, const LoadedScene& b) {
     const auto shared = [](const auto& x, const auto& y) { return same_array(x, y) ? x.size() * sizeof x[0] : 0; };
     const Scene &s = a.scene, &t = b.scene;
     return shared(s.vertices, t.vertices) + shared(s.triangles, t.triangles) + shared(s.quadrics, t.quadrics) +
-           shared(s.instances, t.instances) + shared(s.texels, t.texels) + shared(s.tables, t.tables);
+           shared(s.instances, t.instances) + shared(s.texels, t.texels) + shared(s.tables, t.tables) +
+           shared(s.environment_cells, t.environment_cells);
 }
 
 }  // namespace

@@ -152,6 +152,8 @@ SceneView DoubleScene::view() const {
     v.emitters = emitters_.data();
     v.emitter_cdf = scene_.emitter_cdf.data();
     v.tables = scene_.tables.data();
+    v.environment_rows = reinterpret_cast<const AliasBucket*>(scene_.environment_rows.data());
+    v.environment_cells = reinterpret_cast<const EnvironmentCell*>(scene_.environment_cells.data());
     v.vertex_count = uint32_t(vertices_.size());
     v.triangle_count = uint32_t(triangles_.size());
     v.quadric_count = uint32_t(quadrics_.size());

@@ -153,6 +153,23 @@ TEST_CASE("an edit shares what it leaves as it is") {
     CHECK(edit(first, {{"sensor.fov", "31", {}, {}}}).scene.content_hash == moved.scene.content_hash);
 }
 
+TEST_CASE(
+    "an edit of an environment's scale, or of a table of a BSDF, leaves the density of the environment where it is") {
+    const TempFolder folder;
+    const Loaded first = load(of_project("materials"));
+    for (const nlohmann::json& parameter : scene_parameters(first.editable)) {
+        const std::string name = parameter["name"];
+        const bool scale = name.ends_with(".scale"), alpha = name.ends_with(".alpha");
+        if (!scale && !alpha) continue;
+        INFO(name);
+        const Loaded other = edit(first, {{name, "0.37", {}, {}}});
+        CHECK(contents(other.scene) != contents(first.scene));
+        CHECK(same_array(first.scene.environment_rows, other.scene.environment_rows));
+        CHECK(same_array(first.scene.environment_cells, other.scene.environment_cells));
+        CHECK(equals_its_file(other, folder));
+    }
+}
+
 TEST_CASE("a shape that moves gives the scene another structure and the same textures") {
     const Loaded first = load(of_project("cornell"));
     const Loaded moved = edit(first, {{"floor.to_world", "1 0 0 0 0 1 0 0.1 0 0 1 0 0 0 0 1", {}, {}}});

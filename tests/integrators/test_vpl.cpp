@@ -184,6 +184,25 @@ TEST_CASE(
     CHECK(mean > 0.3 * path);
 }
 
+TEST_CASE("vpl: statistics count connections whose geometry term was clamped") {
+    const Scene scene = project_scene("cornell", 16, 12);
+    const auto items_of = [&](const char* clamp, const std::string& stage) {
+        uint64_t items = 0;
+        for (const StageStats& s : render_scene(scene, vpl_settings(scene, {{"vpl_clamp", clamp}}), 4).stats.stages)
+            if (s.name == stage) items += s.items;
+        return items;
+    };
+    const char* const kClamped = "clamped_connections";
+    const uint64_t connections = items_of("0", "connect_vertices");
+    CHECK(items_of("0", kClamped) == 0);
+    const uint64_t few = items_of("1000", kClamped), more = items_of("1", kClamped), all = items_of("1e-30", kClamped);
+    CHECK(few > 0);
+    CHECK(few < more);
+    CHECK(more < all);
+    CHECK(all < connections);
+    CHECK(all > connections / 4);  // the others: ends that see each other's back
+}
+
 TEST_CASE("vpl: what it says of its bias follows from its settings") {
     const Scene scene = project_scene("cornell", 8, 8);
     CHECK(bias_text(vpl_settings(scene)).empty());

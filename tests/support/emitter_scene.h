@@ -63,6 +63,8 @@ inline SceneView view_of(const Scene& s) {
     v.emitters = s.emitters.data();
     v.emitter_cdf = s.emitter_cdf.data();
     v.tables = s.tables.data();
+    v.environment_rows = s.environment_rows.data();
+    v.environment_cells = s.environment_cells.data();
     v.vertex_count = uint32_t(s.vertices.size());
     v.triangle_count = uint32_t(s.triangles.size());
     v.quadric_count = uint32_t(s.quadrics.size());
@@ -222,19 +224,10 @@ inline std::vector<std::array<uint32_t, 2>> alias_table_of(std::vector<uint32_t>
     return table;
 }
 
-inline void append_environment(Scene& s, Emitter& e, const std::vector<double>& rows,
+inline void append_environment(Scene& s, const std::vector<double>& rows,
                                const std::vector<std::vector<double>>& cells) {
-    const auto word = [&](auto w) {
-        float f;
-        memcpy(&f, &w, 4);
-        s.tables.push_back(f);
-    };
-    while (s.tables.size() % 4) s.tables.push_back(0.0f);
-    e.env_rows = uint32_t(s.tables.size());
     const auto row_tickets = tickets_of(rows);
-    for (auto b : alias_table_of(row_tickets)) word(b[0]), word(b[1]);
-    while (s.tables.size() % 4) s.tables.push_back(0.0f);
-    e.env_cells = uint32_t(s.tables.size());
+    for (auto b : alias_table_of(row_tickets)) s.environment_rows.push_back({b[0], b[1]});
     for (size_t y = 0; y < rows.size(); ++y) {
         const size_t w = cells[y].size();
         const auto tickets = tickets_of(rows[y] > 0 ? cells[y] : std::vector<double>(w, 1.0));
@@ -242,7 +235,8 @@ inline void append_environment(Scene& s, Emitter& e, const std::vector<double>& 
         const auto pdf = [&](size_t x) {
             return float(row_tickets[y] / 16777216.0 * double(rows.size()) * (tickets[x] / 16777216.0) * double(w));
         };
-        for (size_t x = 0; x < w; ++x) word(table[x][0]), word(table[x][1]), word(pdf(x)), word(pdf(table[x][1]));
+        for (size_t x = 0; x < w; ++x)
+            s.environment_cells.push_back({table[x][0], table[x][1], pdf(x), pdf(table[x][1])});
     }
 }
 
@@ -281,7 +275,7 @@ inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
             const SceneView v = view_of(s);
             for (uint32_t y = 0; y < t.height; ++y)
                 for (uint32_t x = 0; x < t.width; ++x) rows[y] += cells[y][x] = envmap_cell_weight(v, e, x, y);
-            append_environment(s, e, rows, cells);
+            append_environment(s, rows, cells);
         }
     }
     if (pick_weights.empty()) pick_weights.assign(s.emitters.size(), 1.0);

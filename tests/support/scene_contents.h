@@ -17,6 +17,7 @@ inline std::string contents(const Scene& s) {
     add(s.vertices), add(s.triangles), add(s.quadrics), add(s.groups), add(s.instances), add(s.shapes),
         add(s.materials);
     add(s.bsdfs), add(s.textures), add(s.texels), add(s.sort_keys), add(s.emitters), add(s.emitter_cdf), add(s.tables);
+    add(s.environment_rows), add(s.environment_cells);
     bytes.append(reinterpret_cast<const char*>(&s.sensor), sizeof s.sensor);
     const IntegratorHint& i = s.integrator;
     const Vec3f c = s.bounds_center;

@@ -69,18 +69,9 @@ AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitte
     return sum * (1.0f / 16.0f);
 }
 
-/// Bucket of cell (x,y) in the alias tables: one aligned load.
-AMBILUX_HD EnvironmentCell load_environment_cell(const SceneView& view, const Emitter& emitter, uint32_t width,
-                                                 uint32_t x, uint32_t y) {
-    EnvironmentCell cell;
-    memcpy(&cell, __builtin_assume_aligned(view.tables + emitter.env_cells + 4 * (uint64_t(y) * width + x), 16), 16);
-    return cell;
-}
-
-AMBILUX_HD AliasBucket load_environment_row(const SceneView& view, const Emitter& emitter, uint32_t y) {
-    AliasBucket row;
-    memcpy(&row, __builtin_assume_aligned(view.tables + emitter.env_rows + 2 * uint64_t(y), 8), 8);
-    return row;
+/// Bucket of cell (x,y) in the alias tables.
+AMBILUX_HD EnvironmentCell environment_cell(const SceneView& view, uint32_t width, uint32_t x, uint32_t y) {
+    return view.environment_cells[uint64_t(y) * width + x];
 }
 
 /// Density per unit square of (u,v) to density per solid angle: dw = 2 pi² sin(theta) du dv.
@@ -97,10 +88,10 @@ AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& em
     const Texture& texture = view.textures[emitter.radiance.texture];
     const uint32_t row_ticket = ticket_of(u.z), ticket = ticket_of(u.x), place = ticket_of(u.y);
     uint32_t y = bucket_of(row_ticket, texture.height);
-    const AliasBucket row = load_environment_row(view, emitter, y);
+    const AliasBucket row = view.environment_rows[y];
     if (row_ticket >= row.threshold) y = row.alias;
     uint32_t x = bucket_of(ticket, texture.width);
-    const EnvironmentCell cell = load_environment_cell(view, emitter, texture.width, x, y);
+    const EnvironmentCell cell = environment_cell(view, texture.width, x, y);
     const bool own = ticket < cell.threshold;
     if (!own) x = cell.alias;
     const float du = (float(place >> 12) + 0.5f) * 0x1p-12f, dv = (float(place & 4095u) + 0.5f) * 0x1p-12f;
@@ -118,7 +109,7 @@ AMBILUX_HD float envmap_pdf_direction(const SceneView& view, const Emitter& emit
     const uint32_t x = wrap_texel(int32_t(uv.x * float(texture.width)), int32_t(texture.width), WrapMode::clamp);
     const uint32_t y = wrap_texel(int32_t(uv.y * float(texture.height)), int32_t(texture.height), WrapMode::clamp);
     const float sin_theta = sqrtf(local.x * local.x + local.z * local.z);
-    return envmap_pdf_to_sa(load_environment_cell(view, emitter, texture.width, x, y).pdf, sin_theta);
+    return envmap_pdf_to_sa(environment_cell(view, texture.width, x, y).pdf, sin_theta);
 }
 
 /// Fills in all but the radiance, which is envmap_lookup at `s.env_uv`.

@@ -1,5 +1,5 @@
 // bdpt, variant learned: a cache of light vertices as in lvc, from which eye vertices draw in proportion to what
-// earlier passes have found (draws.h).
+// earlier iterations have found (draws.h).
 #pragma once
 
 #include "integrators/bdpt/learned/cluster_light_vertices.h"

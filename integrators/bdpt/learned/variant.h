@@ -11,7 +11,7 @@ namespace ambilux {
 
 struct LearnedVariant {
     static constexpr const char* kHelp =
-        "lvc whose draws follow what light vertices have brought to eye vertices in earlier passes";
+        "lvc whose draws follow what light vertices have brought to eye vertices in earlier iterations";
     static constexpr VariantTraits kTraits = {.strategies = true,
                                               .light_subpaths = true,
                                               .draws = true,

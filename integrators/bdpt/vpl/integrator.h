@@ -53,7 +53,9 @@ struct VplIntegrator {
         StageRecord* sort;
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State& state)
-            : two_sides(parts, p, m.two_sides, VplSource{state.in_order(), p.cache_draws, float(p.vpl.subpaths)}) {
+            : two_sides(parts, p, m.two_sides,
+                        VplSource{state.in_order(), p.cache_draws, float(p.vpl.subpaths),
+                                  parts.layout.record("clamped_connections")}) {
             const auto record = [&](const char* name) { return parts.layout.record(name); };
             const SceneView& scene = parts.scene;
             const Wave& wave = parts.wave;

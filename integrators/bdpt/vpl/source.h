@@ -16,10 +16,14 @@ struct VplSource {
     LightVertices<Mis> vertices;
     uint32_t most;         ///< connections of an eye vertex
     float light_subpaths;  ///< of an iteration
+    StageRecord* clamped;  ///< connections whose geometry term was above its bound
 
     AMBILUX_HD static uint32_t first(uint32_t) { return 0; }
     AMBILUX_HD static bool from_cache() { return true; }
-    AMBILUX_HD static NoNote note(const Candidate<Mis>&, Rgb, const WaveState&) { return {}; }
+    AMBILUX_HD NoNote note(const Candidate<Mis>& c, Rgb, const WaveState&) const {
+        if (c.ratio > 0.0f) clamped->count_item(c.strategy.t() - 1);
+        return {};
+    }
     static LearnNothing learn() { return {}; }
     AMBILUX_HD static uint32_t link(const Vertex<Mis>&, uint32_t slot) { return slot; }
     AMBILUX_HD VplSearch search(const RngKey& key, uint32_t depth, const Vertex<Mis>& z, uint32_t max_depth,
