@@ -19,7 +19,7 @@ __constant__ alignas(16) unsigned char optix_params[sizeof(OptixParams)];
 
 namespace {
 
-__forceinline__ const __device__ OptixParams& params() { return reinterpret_cast<const OptixParams&>(optix_params); }
+const __forceinline__ __device__ OptixParams& params() { return reinterpret_cast<const OptixParams&>(optix_params); }
 
 constexpr Features kTraced = kAllFeatures;
 /// Payload::prim after a hit behind which the way goes on.
