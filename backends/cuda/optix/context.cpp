@@ -28,52 +28,33 @@ int first_driver() {
 /// Once in a process.
 void load_library() {
     static const OptixResult loaded = optixInit();
-    const std::string or_else =
-        fmt::format("; {} needs a driver from {} on. Or take accel=cwbvh", interface_text(), first_driver());
-    switch (loaded) {
-        case OPTIX_SUCCESS: return;
-        case OPTIX_ERROR_LIBRARY_NOT_FOUND:
-            throw Error(ExitCode::device,
-                        "accel=optix: libnvoptix.so.1 was not found. It comes with NVIDIA's driver, "
-                        "in a container with NVIDIA_DRIVER_CAPABILITIES=graphics or all" +
-                            or_else);
-        case OPTIX_ERROR_ENTRY_SYMBOL_NOT_FOUND:
-            throw Error(ExitCode::device,
-                        "accel=optix: libnvoptix.so.1 has no optixQueryFunctionTable: it is not of a driver" + or_else);
-        case OPTIX_ERROR_UNSUPPORTED_ABI_VERSION:
-            throw Error(ExitCode::device, fmt::format("accel=optix: the driver's libnvoptix.so.1 does not know the "
-                                                      "interface of the headers that this was built with (error {})",
-                                                      int(loaded)) +
-                                              or_else);
-        default:
-            throw Error(ExitCode::device,
-                        fmt::format("accel=optix: libnvoptix.so.1 answers error {}", int(loaded)) + or_else);
-    }
+    if (loaded == OPTIX_SUCCESS) return;
+    const std::string why =
+        loaded == OPTIX_ERROR_LIBRARY_NOT_FOUND
+            ? "was not found: it comes with NVIDIA's driver, in a container with NVIDIA_DRIVER_CAPABILITIES=graphics"
+        : loaded == OPTIX_ERROR_UNSUPPORTED_ABI_VERSION ? "is of a driver that does not know the interface"
+                                                        : "does not answer";
+    throw Error(ExitCode::device,
+                fmt::format("accel=optix: libnvoptix.so.1 {} (error {}). {} needs a driver from {} on; or take "
+                            "accel=cwbvh",
+                            why, int(loaded), interface_text(), first_driver()));
 }
 
-void receive(unsigned level, const char* tag, const char* message, void* log) {
-    static_cast<OptixLog*>(log)->add(fmt::format("[{}][{}] {}", level, tag, message));
-}
-
-}  // namespace
-
-int OptixLog::shown() {
+int shown() {
     const char* const value = std::getenv("AMBILUX_OPTIX_LOG");
     return value ? std::atoi(value) : 0;
 }
 
-void OptixLog::add(const std::string& line) {
-    if (line.empty()) return;
+/// Of one thread: a context belongs to one renderer.
+void receive(unsigned level, const char* tag, const char* message, void* log) {
+    const std::string line = fmt::format("[{}][{}] {}", level, tag, message);
     if (shown() > 0) log_info("OptiX: " + line);
-    const std::lock_guard lock(mutex_);
-    text_ += line + (line.back() == '\n' ? "" : "\n");
-    if (text_.size() > kKeptLog) text_.erase(0, text_.size() - kKeptLog);
+    std::string& text = *static_cast<std::string*>(log);
+    text += line + "\n";
+    if (text.size() > kKeptLog) text.erase(0, text.size() - kKeptLog);
 }
 
-std::string OptixLog::text() const {
-    const std::lock_guard lock(mutex_);
-    return text_;
-}
+}  // namespace
 
 OptixContext::OptixContext() {
     load_library();
@@ -83,7 +64,7 @@ OptixContext::OptixContext() {
     options.logCallbackFunction = receive;
     options.logCallbackData = &log_;
     options.logCallbackLevel = 4;
-    if (OptixLog::shown() > 1) options.validationMode = OPTIX_DEVICE_CONTEXT_VALIDATION_MODE_ALL;
+    if (shown() > 1) options.validationMode = OPTIX_DEVICE_CONTEXT_VALIDATION_MODE_ALL;
     check(optixDeviceContextCreate(nullptr, &options, &context_), "its context");
 }
 
@@ -94,10 +75,10 @@ OptixContext::~OptixContext() {
 void OptixContext::check(OptixResult result, const char* what) const {
     if (result == OPTIX_SUCCESS) return;
     const cudaError_t cuda = cudaGetLastError();
-    throw Error(ExitCode::device, fmt::format("accel=optix: {}: {} ({}), {}{}. {} answers:\n{}", what,
-                                              optixGetErrorName(result), int(result), optixGetErrorString(result),
-                                              cuda ? fmt::format("; CUDA: {}", cudaGetErrorString(cuda)) : "",
-                                              interface_text(), log_.text()));
+    throw Error(ExitCode::device,
+                fmt::format("accel=optix: {}: {} ({}), {}{}. {} answers:\n{}", what, optixGetErrorName(result),
+                            int(result), optixGetErrorString(result),
+                            cuda ? fmt::format("; CUDA: {}", cudaGetErrorString(cuda)) : "", interface_text(), log_));
 }
 
 }  // namespace ambilux

@@ -3,23 +3,9 @@
 
 #include <optix.h>
 
-#include <mutex>
 #include <string>
 
 namespace ambilux {
-
-/// The last lines that the driver wrote. With AMBILUX_OPTIX_LOG=1 they are shown as well; with 2 the driver also checks
-/// what it is given, and waits after every launch.
-class OptixLog {
-public:
-    static int shown();
-    void add(const std::string& line);
-    std::string text() const;
-
-private:
-    mutable std::mutex mutex_;
-    std::string text_;
-};
 
 class OptixContext {
 public:
@@ -30,12 +16,13 @@ public:
     OptixContext& operator=(const OptixContext&) = delete;
 
     OptixDeviceContext get() const { return context_; }
-    OptixLog& log() const { return log_; }
-    /// Throws Error(device) with `what`, the error and the log unless `result` is OPTIX_SUCCESS.
+    /// Throws Error(device) with `what`, the error and the end of the driver's log unless `result` is OPTIX_SUCCESS.
+    /// With AMBILUX_OPTIX_LOG=1 the log is shown as well; with 2 the driver also checks what it is given, and waits
+    /// after every launch.
     void check(OptixResult result, const char* what) const;
 
 private:
-    mutable OptixLog log_;
+    std::string log_;
     OptixDeviceContext context_ = nullptr;
 };
 

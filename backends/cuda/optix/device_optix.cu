@@ -52,19 +52,10 @@ public:
         options.pipelineLaunchParamsVariableName = "optix_params";
         options.usesPrimitiveTypeFlags = OPTIX_PRIMITIVE_TYPE_FLAGS_TRIANGLE | OPTIX_PRIMITIVE_TYPE_FLAGS_CUSTOM;
         OptixModuleCompileOptions module = {};
-        const auto check = [&](OptixResult result, const char* what) {
-            optix.log().add(std::string(text_, std::min(size_, sizeof(text_))).c_str());
-            size_ = 0;
-            optix.check(result, what);
-        };
-        const auto text = [&] {
-            text_[0] = 0;
-            size_ = sizeof(text_);
-            return &size_;
-        };
-        check(optixModuleCreate(optix.get(), &module, &options, kOptixPrograms, kOptixProgramsSize, text_, text(),
-                                &module_),
-              "compiling its programs");
+        // What compilers say comes through the log of the context too.
+        optix.check(optixModuleCreate(optix.get(), &module, &options, kOptixPrograms, kOptixProgramsSize, nullptr,
+                                      nullptr, &module_),
+                    "compiling its programs");
         const OptixProgramGroupDesc described[kPrograms] = {
             describe(module_, OPTIX_PROGRAM_GROUP_KIND_RAYGEN, "__raygen__closest"),
             describe(module_, OPTIX_PROGRAM_GROUP_KIND_RAYGEN, "__raygen__occluded"),
@@ -72,12 +63,13 @@ public:
             hits(module_, "__closesthit__triangle", "__anyhit__triangle", nullptr),
             hits(module_, "__closesthit__quadric", nullptr, "__intersection__quadric")};
         const OptixProgramGroupOptions none = {};
-        check(optixProgramGroupCreate(optix.get(), described, kPrograms, &none, text_, text(), programs_),
-              "its programs");
+        optix.check(optixProgramGroupCreate(optix.get(), described, kPrograms, &none, nullptr, nullptr, programs_),
+                    "its programs");
         OptixPipelineLinkOptions link = {};
         link.maxTraceDepth = 1;
-        check(optixPipelineCreate(optix.get(), &options, &link, programs_, kPrograms, text_, text(), &pipeline_),
-              "its pipeline");
+        optix.check(
+            optixPipelineCreate(optix.get(), &options, &link, programs_, kPrograms, nullptr, nullptr, &pipeline_),
+            "its pipeline");
         set_stack(two_levels ? 2 : 1);
         pack_records();
     }
@@ -135,8 +127,6 @@ private:
     }
 
     const OptixContext& optix_;
-    char text_[4096] = {};
-    size_t size_ = 0;
     OptixModule module_ = nullptr;
     OptixProgramGroup programs_[kPrograms] = {};
     OptixPipeline pipeline_ = nullptr;
