@@ -17,7 +17,7 @@ CUdeviceptr address_of(const void* pointer) { return reinterpret_cast<CUdevicept
 
 /// What a tree is built over. It must stay where it is: inputs point into it.
 struct Input {
-    OptixBuildInput input = {};
+    OptixBuildInput input = {};  ///< of type 0: nothing
     CUdeviceptr buffer = 0;
     unsigned flags = OPTIX_GEOMETRY_FLAG_NONE;
     OptixAccelBufferSizes sizes = {};
@@ -27,6 +27,7 @@ struct Input {
     Input& operator=(const Input&) = delete;
 
     void of_triangles(const SceneView& scene, uint32_t first, uint32_t count) {
+        if (count == 0) return;
         input.type = OPTIX_BUILD_INPUT_TYPE_TRIANGLES;
         OptixBuildInputTriangleArray& t = input.triangleArray;
         buffer = address_of(scene.vertices);
@@ -41,20 +42,21 @@ struct Input {
         t.flags = &flags;
         t.numSbtRecords = 1;
     }
-    /// `boxes`: on the device.
-    void of_quadrics(const OptixAabb* boxes, uint32_t count) {
+    void of_quadrics(const DeviceBuffer<OptixAabb>& boxes) {
+        if (boxes.size() == 0) return;
         input.type = OPTIX_BUILD_INPUT_TYPE_CUSTOM_PRIMITIVES;
         OptixBuildInputCustomPrimitiveArray& q = input.customPrimitiveArray;
-        buffer = address_of(boxes);
+        buffer = address_of(boxes.data());
         q.aabbBuffers = &buffer;
-        q.numPrimitives = count;
+        q.numPrimitives = unsigned(boxes.size());
         q.flags = &flags;
         q.numSbtRecords = 1;
     }
-    void of_instances(const OptixInstance* instances, uint32_t count) {
+    void of_instances(const DeviceBuffer<OptixInstance>& instances, size_t count) {
+        if (count == 0) return;
         input.type = OPTIX_BUILD_INPUT_TYPE_INSTANCES;
-        input.instanceArray.instances = address_of(instances);
-        input.instanceArray.numInstances = count;
+        input.instanceArray.instances = address_of(instances.data());
+        input.instanceArray.numInstances = unsigned(count);
     }
 };
 
@@ -95,14 +97,16 @@ OptixInstance instance_of(OptixTraversableHandle tree, uint32_t id, uint32_t hit
 class Builder {
 public:
     Builder(const OptixContext& optix, const Scene& scene, const SceneView& on_device)
-        : optix_(optix), scene_(scene), inputs_(2 + scene.groups.size()) {
-        if (const uint32_t n = on_device.ungrouped_count()) inputs_[0].of_triangles(on_device, 0, n);
-        // Their number alone counts until they are built.
-        if (!scene.quadrics.empty()) inputs_[1].of_quadrics(nullptr, uint32_t(scene.quadrics.size()));
+        : optix_(optix), scene_(scene), inputs_(2 + scene.groups.size()),
+          boxes_(boxes_of(scene.quadrics), "boxes of shapes for OptiX") {
+        inputs_[0].of_triangles(on_device, 0, on_device.ungrouped_count());
+        inputs_[1].of_quadrics(boxes_);
         for (size_t g = 0; g < scene.groups.size(); ++g)
-            if (const Group& group = scene.groups[g]; group.triangle_count)
-                inputs_[2 + g].of_triangles(on_device, group.first_triangle, group.triangle_count);
+            inputs_[2 + g].of_triangles(on_device, scene.groups[g].first_triangle, scene.groups[g].triangle_count);
         made_.two_levels = !scene.quadrics.empty() || !scene.instances.empty();
+        if (made_.two_levels)
+            instances_ = DeviceBuffer<OptixInstance>(2 + scene.instances.size(), "instances for OptiX");
+        top_.of_instances(instances_, instances_.size());
     }
 
     OptixStructure build(uint64_t room) {
@@ -112,16 +116,18 @@ public:
                         fmt::format("accel=optix: its structure needs {} MiB for a while, of {} there are; make the "
                                     "scene smaller, or take accel=cwbvh",
                                     (made_.predicted_peak_bytes + (1 << 20) - 1) >> 20, room >> 20));
-        std::vector<OptixTraversableHandle> handles;
-        for (size_t i = 0; i < inputs_.size(); ++i) handles.push_back(i == 1 ? build_quadrics() : build(inputs_[i]));
-        made_.root = made_.two_levels ? build_top(handles) : handles[0];
+        std::vector<OptixTraversableHandle> trees;
+        for (const Input& input : inputs_) trees.push_back(build(input));
+        made_.root = made_.two_levels ? build_top(trees) : trees[0];
         return std::move(made_);
     }
 
 private:
+    uint64_t bytes_beside() const { return boxes_.bytes() + instances_.bytes() + sizeof(uint64_t); }
+
     /// Of all trees as they are at first, and of what the largest needs beside it while it is built.
     uint64_t predict() {
-        uint64_t all = scene_.quadrics.size() * sizeof(OptixAabb), most = 0;
+        uint64_t all = bytes_beside(), most = 0;
         const auto add = [&](Input& input) {
             if (!input.input.type) return;
             const OptixAccelBuildOptions o = options_of(input.input);
@@ -131,53 +137,41 @@ private:
             most = std::max<uint64_t>({most, input.sizes.tempSizeInBytes, input.sizes.outputSizeInBytes});
         };
         for (Input& input : inputs_) add(input);
-        if (made_.two_levels) {
-            top_.of_instances(nullptr, most_instances());
-            add(top_);
-            all += most_instances() * sizeof(OptixInstance);
-        }
-        return all + most + sizeof(uint64_t);
+        add(top_);
+        return all + most;
     }
-    uint32_t most_instances() const { return 2 + uint32_t(scene_.instances.size()); }
 
-    OptixTraversableHandle build_quadrics() {
-        if (scene_.quadrics.empty()) return 0;
-        const DeviceBuffer<OptixAabb> boxes(boxes_of(scene_.quadrics), "boxes of shapes");
-        inputs_[1].of_quadrics(boxes.data(), uint32_t(boxes.size()));
-        return build(inputs_[1], boxes.bytes());
-    }
     OptixTraversableHandle build_top(const std::vector<OptixTraversableHandle>& trees) {
         constexpr Affine kHere = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
         std::vector<OptixInstance> list;
-        if (trees[0]) list.push_back(instance_of(trees[0], kOptixTriangles, kTriangleGroup, kHere));
-        if (trees[1]) list.push_back(instance_of(trees[1], kOptixQuadrics, kQuadricGroup, kHere));
-        for (size_t i = 0; i < scene_.instances.size(); ++i)
-            if (const Instance& instance = scene_.instances[i]; trees[2 + instance.group])
-                list.push_back(instance_of(trees[2 + instance.group], kOptixFirstInstance + uint32_t(i), kTriangleGroup,
-                                           instance.to_world));
+        const auto add = [&](size_t tree, uint32_t id, uint32_t hit_group, const Affine& to_world) {
+            if (trees[tree]) list.push_back(instance_of(trees[tree], id, hit_group, to_world));
+        };
+        add(0, kOptixTriangles, kTriangleGroup, kHere);
+        add(1, kOptixQuadrics, kQuadricGroup, kHere);
+        for (uint32_t i = 0; i < scene_.instances.size(); ++i)
+            add(2 + scene_.instances[i].group, kOptixFirstInstance + i, kTriangleGroup, scene_.instances[i].to_world);
         if (list.empty()) return 0;
-        const DeviceBuffer<OptixInstance> instances(list, "instances for OptiX");
-        top_.of_instances(instances.data(), uint32_t(list.size()));
-        return build(top_, instances.bytes());
+        DeviceMemory::put(instances_.data(), list.data(), list.size() * sizeof(OptixInstance));
+        top_.of_instances(instances_, list.size());
+        return build(top_);
     }
 
-    /// `beside`: bytes that are there meanwhile.
-    OptixTraversableHandle build(Input& input, uint64_t beside = 0) {
+    OptixTraversableHandle build(const Input& input) {
         if (!input.input.type) return 0;
         const OptixAccelBuildOptions o = options_of(input.input);
         DeviceBuffer<uint64_t> compacted(1, "size of a structure");
         const OptixAccelEmitDesc emit = {address_of(compacted.data()), OPTIX_PROPERTY_TYPE_COMPACTED_SIZE};
         OptixTraversableHandle handle = 0;
         DeviceBuffer<std::byte> tree(input.sizes.outputSizeInBytes, "OptiX's structure");
-        {
-            DeviceBuffer<std::byte> temporary(input.sizes.tempSizeInBytes, "memory of OptiX's builder");
-            optix_.check(optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()),
-                                         temporary.bytes(), address_of(tree.data()), tree.bytes(), &handle, &emit,
-                                         is_compacted(input.input) ? 1 : 0),
-                         "building its structure");
-            wait_for_default_stream("building OptiX's structure");
-            note_peak(beside + tree.bytes() + temporary.bytes());
-        }
+        DeviceBuffer<std::byte> temporary(input.sizes.tempSizeInBytes, "memory of OptiX's builder");
+        optix_.check(
+            optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()), temporary.bytes(),
+                            address_of(tree.data()), tree.bytes(), &handle, &emit, is_compacted(input.input)),
+            "building its structure");
+        wait_for_default_stream("building OptiX's structure");
+        note_peak(tree.bytes() + temporary.bytes());
+        temporary = {};
         const uint64_t smaller = is_compacted(input.input) ? compacted.download()[0] : 0;
         if (smaller > 0 && smaller < tree.bytes()) {
             DeviceBuffer<std::byte> copy(smaller, "OptiX's structure");
@@ -185,21 +179,21 @@ private:
                 optixAccelCompact(optix_.get(), nullptr, handle, address_of(copy.data()), copy.bytes(), &handle),
                 "compaction of its structure");
             wait_for_default_stream("compaction of OptiX's structure");
-            note_peak(beside + tree.bytes() + copy.bytes());
+            note_peak(tree.bytes() + copy.bytes());
             tree = std::move(copy);
         }
         made_.bytes += tree.bytes();
         made_.trees.push_back(std::move(tree));
         return handle;
     }
-    void note_peak(uint64_t now) {
-        made_.peak_bytes = std::max(made_.peak_bytes, made_.bytes + now + sizeof(uint64_t));
-    }
+    void note_peak(uint64_t now) { made_.peak_bytes = std::max(made_.peak_bytes, made_.bytes + now + bytes_beside()); }
 
     const OptixContext& optix_;
     const Scene& scene_;
     std::vector<Input> inputs_;
     Input top_;
+    DeviceBuffer<OptixAabb> boxes_;
+    DeviceBuffer<OptixInstance> instances_;
     OptixStructure made_;
 };
 
