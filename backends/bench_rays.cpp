@@ -97,21 +97,40 @@ private:
     FastOnDevice built_;
 };
 
-template <class Accel>
-nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
+void need_device() {
     if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: " + why_no_cuda_device());
-    const Accel accel(scene);
-    const SceneView view = scene.view();
-    const std::vector<RayBatch> batches = with_traversal_features(
-        scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
+}
+
+template <class Accel>
+std::vector<RayBatch> device_batches(const Scene& scene, const Accel& accel) {
+    return with_traversal_features(scene.features, [&](auto set) {
+        return make_ray_batches<set.value>(scene.view(), accel.tracer(), kCudaSize, 0);
+    });
+}
+
+nlohmann::json on_device(const std::vector<RayBatch>& batches, const std::vector<std::vector<KernelTiming>>& timings,
+                         const std::string& accel_name, int repetitions, double build_seconds, uint64_t bytes) {
     nlohmann::json rows = nlohmann::json::array();
-    const std::vector<std::vector<KernelTiming>> timings =
-        time_rays_on_device(scene, accel.arrays(), batches, kBenchWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)
         for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
-    return {{"device", cuda_device_name()},        {"accel", accel_name},
-            {"repetitions", repetitions},          {"build_seconds", accel.build_seconds()},
-            {"accel_bytes", accel.memory_bytes()}, {"rows", rows}};
+    return {{"device", cuda_device_name()},   {"accel", accel_name},  {"repetitions", repetitions},
+            {"build_seconds", build_seconds}, {"accel_bytes", bytes}, {"rows", rows}};
+}
+
+nlohmann::json bench_optix(const Scene& scene, int repetitions) {
+    need_device();
+    const std::vector<RayBatch> batches = device_batches(scene, CwbvhAccel(scene));
+    const OptixTimings timings = time_rays_by_optix(scene, batches, kBenchWarmUps, repetitions);
+    return on_device(batches, timings.batches, "optix", repetitions, timings.build_seconds, timings.bytes);
+}
+
+template <class Accel>
+nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
+    need_device();
+    const Accel accel(scene);
+    const std::vector<RayBatch> batches = device_batches(scene, accel);
+    return on_device(batches, time_rays_on_device(scene, accel.arrays(), batches, kBenchWarmUps, repetitions),
+                     accel_name, repetitions, accel.build_seconds(), accel.memory_bytes());
 }
 
 }  // namespace
@@ -149,10 +168,12 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
         json = bench_on_host<PairAccel>(scene, "bvh2", repetitions);
     else if (chosen == "cuda-bvh2")
         json = bench_on_device<PairAccel>(scene, "bvh2", repetitions);
+    else if (chosen == "cuda-optix")
+        json = bench_optix(scene, repetitions);
     else
         throw Error(ExitCode::usage, "bench rays: backend '" + backend +
                                          "' is not one of auto, cpu, cpu-single, cpu-cwbvh, cpu-fast, cpu-bvh2, cuda, "
-                                         "cuda-fast, cuda-bvh2");
+                                         "cuda-fast, cuda-bvh2, cuda-optix");
     json["backend"] = chosen;
     json["opaque"] = opaque;
     return json;

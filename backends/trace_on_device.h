@@ -16,4 +16,14 @@ namespace ambilux {
 std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent,
                                  bool binary = false);
 
+/// What OptiX answers (accel=optix), through a structure built for this call.
+struct OptixAnswers {
+    std::vector<Hit> hits;     ///< as those of trace_on_device
+    uint64_t bytes = 0;        ///< that it is said to take, with the stacks of its launches
+    uint64_t taken_bytes = 0;  ///< that are gone from the device beside scene and rays: with the driver's own
+    uint64_t peak_bytes = 0, predicted_peak_bytes = 0;  ///< of the structure while it was built
+};
+/// Throws Error(device) without a device or the driver's library, Error(usage) in a build without OptiX.
+OptixAnswers trace_by_optix(const Scene& scene, const std::vector<Ray>& rays, bool any_hit);
+
 }  // namespace ambilux

@@ -172,6 +172,7 @@ void add_bench(CLI::App& app, Run& run) {
     rays_command
         .add_option("--backend", r->backend,
                     "auto, cpu, cpu-single (no packets), cuda, cuda-fast (build=fast), cuda-bvh2 (a binary BVH), "
+                    "cuda-optix (OptiX), "
                     "cpu-cwbvh, cpu-fast or cpu-bvh2 (the structures of cuda on the CPU)")
         ->capture_default_str();
     rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")

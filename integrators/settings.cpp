@@ -77,6 +77,7 @@ bool sorts(const VariantTraits& v, bool) { return v.sorts; }
 bool compacts(const VariantTraits& v, bool) { return v.compacts; }
 bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
 bool has_binary_bvh(const VariantTraits& v, bool cuda) { return v.binary_bvh && cuda; }
+bool has_launched_rays(const VariantTraits& v, bool cuda) { return !v.one_kernel && cuda; }
 bool has_light_tree(const VariantTraits& v, bool) { return v.light_tree; }
 bool has_sobol(const VariantTraits& v, bool) { return v.sobol; }
 bool has_twin(const VariantTraits& v, bool cuda) { return v.in_double && !cuda; }
@@ -118,10 +119,12 @@ std::vector<Setting> main_settings() {
             .image_attribute(),
         Is(Of::flag("deterministic", &S::deterministic, "same bits in every run on the same backend"))
             .limit("true", repeats, "a cache's order differs between runs on a CUDA device"),
-        Is(Of::choice("accel", &S::accel, {"auto", "embree", "cwbvh", "bvh2"},
-                      "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA"))
+        Is(Of::choice("accel", &S::accel, {"auto", "embree", "cwbvh", "bvh2", "optix"},
+                      "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA; optix: OptiX of the "
+                      "driver, in builds with its headers"))
             .limit("embree", on_cpu, "the cuda backend has a structure of its own, cwbvh")
-            .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
+            .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh")
+            .limit("optix", has_launched_rays, "OptiX follows rays of queues, on CUDA devices"),
         Is(Of::choice(
             "build", &S::build, {"auto", "fast", "good"},
             "how cwbvh is built: fast, by the device; good, by the CPU, in 25 to 700 times as long, for rays "

@@ -39,7 +39,7 @@ enum class Precision : uint32_t {
 
 /// The structure that rays are traced through: of a host Embree's (automatic) or the one built for CUDA, of a device
 /// the latter (automatic) or a binary BVH to compare with.
-enum class AccelKind : uint32_t { automatic, embree, cwbvh, bvh2 };
+enum class AccelKind : uint32_t { automatic, embree, cwbvh, bvh2, optix };
 
 /// How that of CUDA is built.
 enum class Build : uint32_t {

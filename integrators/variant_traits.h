@@ -51,6 +51,7 @@ struct VariantTraits {
     bool compacts = true;          ///< has queues whose items can lie by path
     bool repeats = true;           ///< on a device too, bits repeat with deterministic=true
     bool binary_bvh = false;       ///< has kernels for accel=bvh2
+    bool one_kernel = false;       ///< on a device rays do not pass through queues
     bool streams = false;          ///< a wave holds more paths than it has slots
     bool light_tree = false;       ///< has kernels that pick lights by a tree (level Sampling)
     bool sobol = false;            ///< has kernels whose numbers are Sobol' points (level Sampling)

@@ -35,7 +35,7 @@ public:
     static uint32_t threads() { return 0; }
     static BackendBytes bytes() { return {device_primitive_bytes(), order_temporary_bytes}; }
     const std::string& device() const { return device_name_; }
-    const char* accel() const { return structure_.pairs() ? "bvh2" : "cwbvh"; }
+    const char* accel() const { return structure_.name(); }
 
     // ---- scene and memory ----
 
@@ -43,19 +43,19 @@ public:
     HostTracer find_structure(SharedAccels& accels) {
         constexpr bool kPilot =
             requires(HostTracer t) { Integrator::pilot(maker_.policy, maker_.view, t, uint64_t()); };
-        const bool fast = maker_.settings.build == Build::fast;
-        if (fast) {
+        const bool on_device = DeviceStructure::built_on_device(maker_.settings);
+        if (on_device) {
             const auto start = Clock::now();
             device_scene_ = accels.get<DeviceScene>();
             upload_seconds_ = seconds_since(start);
         }
         const HostTracer tracer =
-            structure_.find(maker_.scene, maker_.settings, accels, fast ? room(scene_bytes().total()) : 0, kPilot);
-        if (structure_.fast()) peak_ = device_scene_->bytes() + structure_.fast()->peak_bytes();
+            structure_.find(maker_.scene, maker_.settings, accels, on_device ? room(scene_bytes().total()) : 0, kPilot);
+        if (const uint64_t peak = structure_.peak_bytes()) peak_ = device_scene_->bytes() + peak;
         accel_bytes_ = structure_.bytes();
         if constexpr (requires { Stages::kTracesConnections; })
             maker_.policy.traces_connections =
-                Stages::kTracesConnections && traces_connections(maker_.policy, accel_bytes_);
+                Stages::kTracesConnections && !structure_.optix() && traces_connections(maker_.policy, accel_bytes_);
         if (maker_.picks_by_tree()) accel_bytes_ += light_tree_bytes(maker_.scene);
         return tracer;
     }
@@ -309,9 +309,15 @@ private:
         executor_.emplace(stream_.get(), traced_, state_, clock_.data(), maker_.view, wave_.order);
         if constexpr (!Maker::kFilmWide)
             if (structure_.pairs()) executor_->use(structure_.pairs()->tracer());
+        bool graphs = maker_.settings.graph;
+        if (DeviceOptix* const optix = structure_.optix()) {
+            optix->take(wave_.handed, stream_.get());
+            executor_->use(*optix, wave_.handed);
+            graphs = graphs && optix->can_be_captured(stream_.get());
+        }
         phases_.clear();
         const auto start = Clock::now();
-        if (maker_.settings.graph) {
+        if (graphs) {
             Capture capture = {*this};
             run_iteration<Integrator>(capture);
         }

@@ -1,4 +1,4 @@
-// What rays of a device go through: a wide BVH by the good builder or by the device itself, or a binary one.
+// What rays of a device go through: a wide BVH by the good builder or by the device itself, a binary one, or OptiX's.
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 
 #include "accel/host_tracer.h"
 #include "accel/shared_accels.h"
+#include "backends/cuda/device_optix.h"
 #include "backends/cuda/device_scene.h"
 #include "backends/fast_cwbvh.h"
 #include "core/error.h"
@@ -17,14 +18,23 @@ namespace ambilux {
 
 class DeviceStructure {
 public:
-    /// Finds or builds it: the device's own, with build=fast, within `room` bytes beside the scene that is there, the
-    /// others on the host. Returns what a pilot traces with, if `pilot` asks for that.
+    /// True of those that the device builds, from a scene that is there.
+    static bool built_on_device(const RenderSettings& settings) {
+        return settings.build == Build::fast || settings.accel == AccelKind::optix;
+    }
+    /// Finds or builds it: the device's own within `room` bytes beside the scene, the others on the host. Returns what
+    /// a pilot traces with, if `pilot` asks for that.
     HostTracer find(const Scene& scene, const RenderSettings& settings, SharedAccels& accels, uint64_t room,
                     bool pilot) {
         if (settings.accel == AccelKind::bvh2) {
             host_pairs_.emplace(scene);
             bytes_ = host_pairs_->arrays().bytes();
             return {};
+        }
+        if (settings.accel == AccelKind::optix) {
+            optix_ = std::make_unique<DeviceOptix>(scene, accels.get<DeviceScene>()->view(), room);
+            bytes_ = optix_->bytes();
+            return pilot ? HostTracer(accels.get<CwbvhAccel>()->tracer()) : HostTracer();  // as with cwbvh
         }
         if (settings.build == Build::fast) build_fast(scene, settings, accels, room);
         if (fast_) {
@@ -36,6 +46,7 @@ public:
         return HostTracer(accel->tracer());
     }
     void upload(SharedAccels& accels, CwbvhTracer& tracer) {
+        if (optix_) return;
         if (host_pairs_) {
             pairs_.emplace(host_pairs_->arrays());
             host_pairs_.reset();
@@ -46,10 +57,15 @@ public:
     }
     /// As find() knows them.
     uint64_t bytes() const { return bytes_; }
-    uint64_t resident_bytes() const { return pairs_ ? pairs_->bytes() : wide_->bytes(); }
+    uint64_t resident_bytes() const { return optix_ ? optix_->bytes() : pairs_ ? pairs_->bytes() : wide_->bytes(); }
+    /// While a device has built it.
+    uint64_t peak_bytes() const { return optix_ ? optix_->peak_bytes() : fast_ ? fast_->peak_bytes() : 0; }
+    const char* name() const { return optix_ ? "optix" : pairs_ ? "bvh2" : "cwbvh"; }
     /// Null unless the device has built it.
     const DeviceFastCwbvh* fast() const { return fast_.get(); }
     const std::optional<DevicePairs>& pairs() const { return pairs_; }
+    /// Null unless accel=optix.
+    DeviceOptix* optix() const { return optix_.get(); }
 
 private:
     /// Leaves fast_ empty, with a line in the log, if memory or the depth of the tree forbids it.
@@ -70,6 +86,7 @@ private:
     std::shared_ptr<const DeviceCwbvh> wide_;
     std::shared_ptr<const DeviceFastCwbvh> fast_;  ///< it, if the device has built it
     std::optional<DevicePairs> pairs_;             ///< instead, with accel=bvh2
+    std::unique_ptr<DeviceOptix> optix_;           ///< instead, with accel=optix
     uint64_t bytes_ = 0;
 };
 

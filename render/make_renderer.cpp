@@ -5,6 +5,7 @@
 #include <set>
 
 #include "backends/cuda_device.h"
+#include "backends/optix.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "integrators/registry.h"
@@ -28,7 +29,8 @@ Build settled_build(const RenderSettings& s, bool cuda, const Scene& scene) {
         log_info("build=fast: trees of scenes with instances have two levels, which the good builder makes alone");
     if (s.build == Build::good || !scene.groups.empty()) return Build::good;
     if (s.build == Build::fast) return Build::fast;
-    if (!cuda || !s.may_build_fast || s.accel == AccelKind::bvh2 || s.deterministic) return Build::good;
+    if (!cuda || !s.may_build_fast || s.accel == AccelKind::bvh2 || s.accel == AccelKind::optix || s.deterministic)
+        return Build::good;
     const bool short_time = s.expected_seconds > 0 && kGoodSeconds * double(triangles) > 0.2 * s.expected_seconds;
     return short_time || (s.expected_seconds <= 0 && triangles >= kManyTriangles) ? Build::fast : Build::good;
 }
@@ -39,9 +41,18 @@ void check_build(const RenderSettings& s, bool cuda) {
         throw Error(ExitCode::usage,
                     "build=fast: the pilot of bdpt.auto=true traces through the good structure; leave "
                     "one of the two out, or render with the settings that it chooses");
-    if (s.accel == AccelKind::bvh2 || (!cuda && s.accel != AccelKind::cwbvh))
+    if (s.accel == AccelKind::bvh2 || s.accel == AccelKind::optix || (!cuda && s.accel != AccelKind::cwbvh))
         throw Error(ExitCode::usage, fmt::format("build=fast: it builds accel=cwbvh alone; {}",
                                                  cuda ? "leave one of the two out" : "set that, or leave it out"));
+}
+
+void check_optix(const RenderSettings& s) {
+    if (s.accel != AccelKind::optix) return;
+    if (!kOptixBuilt) throw Error(ExitCode::usage, kWhyNoOptix);
+    if (s.deterministic)
+        throw Error(ExitCode::usage,
+                    "deterministic=true: OptiX does not promise which of two surfaces at one distance "
+                    "it finds; take accel=cwbvh, or leave one of the two out");
 }
 
 /// What settings that are left open stand for (docs/performance.md).
@@ -109,6 +120,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     const bool cuda = settings.backend == Backend::cuda || (open && cuda_available());
     check_settings(settings, variant, cuda);
     check_build(settings, cuda);
+    check_optix(settings);
     accels.place_textures(settings.textures);
     if (in_double && settings.light_picking == LightPicks::tree)
         throw Error(ExitCode::usage, "light_picking=tree: precision=double picks emitters by the table alone");

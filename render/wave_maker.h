@@ -1,6 +1,7 @@
 // What waves are made of, on every backend: places in memory, and the stages that work on them.
 #pragma once
 
+#include "backends/handed_rays.h"
 #include "integrators/contract.h"
 #include "render/statistics.h"
 #include "render/wave_plan.h"
@@ -22,6 +23,7 @@ struct WaveMemory {
     Lane* samples = nullptr;  ///< of eye subpaths, where they are not those of the film
     typename Integrator::Memory queues;
     OrderMemory order;
+    HandedRays handed;  ///< accel=optix
 };
 
 template <class Integrator, Features F, class SomeTracer>
@@ -66,6 +68,7 @@ struct WaveMaker {
         m.samples = layout.allocate<Lane>(keeps_samples() ? slots : 0);
         m.queues = Integrator::lay_out(layout, policy, {slots, kept, bytes.primitives});
         m.order = lay_out_order(layout, policy.waves.queues, listed, bytes.order(policy.waves.queues, listed));
+        m.handed = HandedRays::lay_out(layout, settings.accel == AccelKind::optix ? slots : 0);
         layout.record(UpdateFilm::kName);
         Wave wave = plan.wave;
         wave.state = m.state;

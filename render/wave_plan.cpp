@@ -152,7 +152,8 @@ WaveProgress progress_of(const Wave& wave, uint32_t first_tile, uint32_t waves) 
 
 uint32_t multi_bounce_below(const RenderSettings& settings, uint32_t slots) {
     const bool suits = !settings.deterministic && settings.technique_depth == 0 && settings.fuse != Fuse::none &&
-                       !settings.queues.fixed_places() && settings.accel != AccelKind::bvh2;
+                       !settings.queues.fixed_places() && settings.accel != AccelKind::bvh2 &&
+                       settings.accel != AccelKind::optix;
     return settings.tail && suits ? std::min(kMultiBounceBelow, slots / kBouncesPerLaunch) : 0;
 }
 

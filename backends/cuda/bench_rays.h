@@ -27,4 +27,13 @@ std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, c
                                                            const std::vector<RayBatch>& batches, int warm_ups,
                                                            int repetitions);
 
+struct OptixTimings {
+    std::vector<std::vector<KernelTiming>> batches;
+    uint64_t bytes = 0;
+    double build_seconds = 0;
+};
+/// The same by OptiX (accel=optix). Throws Error(usage) in a build without it.
+OptixTimings time_rays_by_optix(const Scene& scene, const std::vector<RayBatch>& batches, int warm_ups,
+                                int repetitions);
+
 }  // namespace ambilux

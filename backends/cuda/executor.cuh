@@ -10,12 +10,15 @@
 #include <type_traits>
 
 #include "backends/cuda/device_memory.h"
+#include "backends/cuda/device_optix.h"
 #include "backends/cuda/graph_capture.h"
+#include "backends/cuda/handed_kernels.cuh"
 #include "backends/cuda/order.h"
 #include "backends/cuda/primitives.h"
 #include "backends/cuda/ray_kernels.cuh"
 #include "backends/cuda/record_kernels.cuh"
 #include "backends/cuda/stage_kernels.cuh"
+#include "backends/optix.h"
 
 namespace ambilux {
 
@@ -40,6 +43,11 @@ public:
         requires kPairs
     {
         pairs_ = pairs;
+    }
+    /// Rays are handed over to launches of `optix`, which has taken `handed`.
+    void use(const DeviceOptix& optix, const HandedRays& handed) {
+        optix_ = &optix;
+        handed_ = handed;
     }
 
     /// Captures what `schedule(*this)` launches.
@@ -102,6 +110,7 @@ public:
     template <class Stage>
     void extend_coherent(const Stage& stage) {
         const detail::Items items = prepare<void>(stage);  // in order as they are
+        if (hands_over(stage, items)) return finish_extend(stage);
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
@@ -111,6 +120,13 @@ public:
     /// generate and the extend that follows, of depth 1; the time is extend's. Items must be appended.
     template <class Generate, class Extend>
     void generate_and_extend(const Generate& generate, const Extend& extend, uint32_t slots) {
+        if constexpr (kOptixBuilt) {
+            if (optix_) {
+                run_slots(generate, slots);
+                set_depth(1);
+                return extend_coherent(extend);
+            }
+        }
         finish(generate, nullptr, nullptr, slots);
         set_depth(1);
         with_tracer(extend, [&](auto set, const auto& tracer) {
@@ -216,10 +232,28 @@ private:
     template <class Stage>
     void launch_traces(const Stage& stage) {
         const detail::Items items = prepare<MortonOrder>(stage);
+        if (hands_over(stage, items)) return;
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
         });
+    }
+    /// Of items that go to OptiX; false if they do not. As many runs as the whole queue takes: how many items it holds
+    /// is known on the device, and runs without any end at once.
+    template <class Stage>
+    bool hands_over([[maybe_unused]] const Stage& stage, [[maybe_unused]] const detail::Items& items) {
+        if constexpr (kOptixBuilt) {
+            if (!optix_) return false;
+            const uint32_t threads = (handed_.capacity - 1) / detail::kHandBlock + 1;
+            for (uint64_t first = 0; first < items.capacity; first += handed_.capacity) {
+                detail::hand_over<<<threads, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
+                cuda_check(cudaGetLastError(), Stage::kName);
+                optix_->trace(Stage::kAnyHit, stream());
+                detail::take_back<<<threads, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
+            }
+            return true;
+        }
+        return false;
     }
     /// f(FeatureSet, tracer) with the set that tracing needs.
     template <class Stage, class Function>
@@ -339,6 +373,8 @@ private:
     GraphCapture graph_;
     Features traced_;
     std::optional<PairTracer> pairs_;
+    const DeviceOptix* optix_ = nullptr;  ///< null: rays are traced by kernels
+    HandedRays handed_;
     WaveState* state_;
     uint64_t* clock_;
     SceneView scene_;

@@ -55,6 +55,10 @@ std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const P
     throw not_built();
 }
 
+OptixAnswers trace_by_optix(const Scene&, const std::vector<Ray>&, bool) { throw not_built(); }
+
+OptixTimings time_rays_by_optix(const Scene&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
+
 std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<PathHit>&,
                                                const std::vector<PathRay>&, int, int) {
     throw not_built();

@@ -7,6 +7,7 @@ Without scenes those of the project. Mitsuba (cuda_ad_rgb; on a CPU llvm_ad_rgb)
 over the time of rendering; the median of three seeds. About two minutes.
 """
 
+import argparse
 import csv
 import json
 import os
@@ -41,7 +42,18 @@ def of_bench(a, what, scene, *more):
 
 
 def rays(a):
-    """Millions a second, by batch."""
+    """Millions a second, by batch; once more by OptiX, where the program and the driver have it."""
+    rays_by(a)
+    if a.backend == "cuda":
+        asked = subprocess.run([a.program, "bench", "rays", a.scenes[0], "--backend", "cuda-optix", "--repetitions", "1"], capture_output=True, text=True)
+        if asked.returncode:
+            print(f"Without OptiX: {asked.stderr.strip()}\n")
+        else:
+            print("By OptiX, which runs in software on devices without ray tracing cores:\n")
+            rays_by(argparse.Namespace(**{**vars(a), "backend": "cuda-optix"}))
+
+
+def rays_by(a):
     found = {scene: {row["batch"]: row["mrays_per_s"] for row in of_bench(a, "rays", scene)["rows"]} for scene in a.scenes}
     batches = list(dict.fromkeys(batch for of_scene in found.values() for batch in of_scene))
     table(["Mrays/s", *batches], [[name_of(scene), *(f"{of_scene[b]:.4g}" if b in of_scene else "" for b in batches)] for scene, of_scene in found.items()])

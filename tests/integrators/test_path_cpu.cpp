@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "backends/optix.h"
 #include "core/error.h"
 #include "tests/support/render_checks.h"
 #include "tests/support/render_scene.h"
@@ -302,6 +303,17 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
         device.integrator = backend == std::string("cpu") ? "path" : "bdpt";
         CHECK_THROWS_WITH(make_renderer(scene, device), ContainsSubstring("bvh2") && ContainsSubstring("cwbvh"));
     }
+    device.accel = "optix";
+    device.integrator = "path";
+    device.backend = "cpu";
+    CHECK_THROWS_WITH(make_renderer(scene, device), ContainsSubstring("accel=optix") && ContainsSubstring("cuda"));
+    device.backend = "cuda";
+    if (!kOptixBuilt)
+        CHECK_THROWS_WITH(make_renderer(scene, device),
+                          ContainsSubstring("OptiX_ROOT") && ContainsSubstring("accel=cwbvh"));
+    device.variant = "megakernel";
+    device.integrator = "bdpt";
+    CHECK_THROWS_WITH(make_renderer(scene, device), ContainsSubstring("accel=optix: OptiX follows rays of queues"));
     RenderSettings fast = settings_of(scene);
     fast.build = Build::fast;
     CHECK_THROWS_WITH(make_renderer(scene, fast), ContainsSubstring("build=fast") && ContainsSubstring("accel=cwbvh"));

@@ -348,7 +348,8 @@ TEST_CASE("sizes of waves follow from what is expected, what there is room for a
                                                                                      {"technique_depth", "4"},
                                                                                      {"fuse", "none"},
                                                                                      {"compaction", "select"},
-                                                                                     {"accel", "bvh2"}}) {
+                                                                                     {"accel", "bvh2"},
+                                                                                     {"accel", "optix"}}) {
         CAPTURE(key);
         RenderSettings other;
         apply_setting(other, key, value);

@@ -11,6 +11,7 @@ struct MegakernelVariant {
                                               .light_subpaths = true,
                                               .sorts = false,
                                               .compacts = false,
+                                              .one_kernel = true,
                                               .replay = ReplayPairing::registers,
                                               .references = References::as_it_is};
 
