@@ -68,6 +68,7 @@ struct PathOptimalIntegrator {
         GenerateRecorded<GenerateEye<F, Mis>> generate;
         NoteHits<F, Mis> hits[2];
         AddOptimal add;
+        SumNeighbourhoods sum;
         SolveBlocks solve;
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& policy, const Memory& m, const State& state)
@@ -81,6 +82,7 @@ struct PathOptimalIntegrator {
                            strategies,  m.records,    note(NoteHits<F, Mis>::kName)};
             add = {
                 parts.wave, strategies, m.records, state, parts.film.samples, parts.film.sums, note(AddOptimal::kName)};
+            sum = {state, note(SumNeighbourhoods::kName)};
             solve = {strategies, state, note(SolveBlocks::kName)};
         }
 
@@ -94,7 +96,10 @@ struct PathOptimalIntegrator {
     template <class Run>
     static void iteration(Run& run) {
         run.for_waves([](auto& exec, const Stages& s) { wave(exec, s); });
-        run.once([](auto& exec, const Stages& s) { exec.for_each(s.solve, s.solve.state.blocks.count()); });
+        run.once([](auto& exec, const Stages& s) {
+            exec.for_each(s.sum, s.sum.state.neighbourhoods.count());
+            exec.for_each(s.solve, s.solve.state.blocks.count());
+        });
     }
 
 private:

@@ -35,21 +35,30 @@ struct StrategySums {
     AMBILUX_HD static constexpr uint32_t words(uint32_t strategies) { return 5 + 4 * strategies; }
 };
 
+/// To the sums of a block of pixels as much as some vertices near it have told, in the mean: what a block knows by
+/// itself outweighs them once it has had more. To those as many vertices that have found nothing.
+AMBILUX_HD void add_from_near(double* sums, const double* near, uint32_t words) {
+    constexpr double kFromNear = 8.0, kNothing = 4.0;
+    const double n = near[StrategySums::kVertices];
+    if (!(n > 0.0)) return;
+    const double scale = kFromNear / (n + kNothing);
+    for (uint32_t k = 0; k < words; ++k) sums[k] += near[k] * scale;
+    sums[StrategySums::kScaleSquared] += near[StrategySums::kScaleSquared] * (kFromNear / n - scale);
+}
+
 /// `advantages`: of each strategy of next event estimation, α(strategy) / probability - α(hit), where α solves A α = b.
 /// A has the products of next event estimation and hits beside its diagonal alone, since emitters do not overlap, and
 /// its rows times the numbers of samples sum to one: the solution is closed.
 AMBILUX_HD void solve_strategies(const double* sums, const EmitterStrategies& all, Rgb* advantages) {
-    // Few samples say little: as if so many more had found nothing to prefer.
-    constexpr double kPrior = 4.0;
-    // A is positive definite, but not always what few samples say of it.
-    constexpr double kMostOverlap = 0.9, kLeastRest = 0.01;
-    const double n = sums[StrategySums::kVertices], m = sums[StrategySums::kScaleSquared];
+    constexpr double kLeastRest = 0.02;  // A is positive definite, but not always what few samples say of it
+    const double m = sums[StrategySums::kScaleSquared];
     for (uint32_t k = 0; k < all.count; ++k) advantages[k] = {0.0f, 0.0f, 0.0f};
-    if (!(n > 0.0 && m > 0.0)) return;
-    double overlap[EmitterStrategies::kMost], rest = 1.0;  // A(strategy, hit)
+    if (!(m > 0.0)) return;
+    double overlap[EmitterStrategies::kMost], rest = 1.0;  // A(strategy, hit), at most 1 / (1 + probability)
     for (uint32_t k = 0; k < all.count; ++k) {
-        const double p = double(all.probability[k]), a = sums[StrategySums::overlap(k)] / (m * p);
-        overlap[k] = p > 0.0 ? (a < kMostOverlap ? a : kMostOverlap) : 0.0;
+        const double p = double(all.probability[k]), a = sums[StrategySums::overlap(k)] / (m * p),
+                     most = 1.0 / (1.0 + p);
+        overlap[k] = p > 0.0 ? (a < most ? a : most) : 0.0;
         rest -= p * overlap[k] / (1.0 - overlap[k]);
     }
     if (rest < kLeastRest) rest = kLeastRest;
@@ -62,7 +71,7 @@ AMBILUX_HD void solve_strategies(const double* sums, const EmitterStrategies& al
             const double p = double(all.probability[k]);
             if (!(p > 0.0)) continue;
             const double next_event = sums[StrategySums::next_event(k) + c] / (m * p) - overlap[k] * hit;
-            advantages[k][c] = float((next_event / (1.0 - overlap[k]) - hit) * (n / (n + kPrior)));
+            advantages[k][c] = float(next_event / (1.0 - overlap[k]) - hit);
         }
     }
 }

@@ -97,7 +97,29 @@ private:
     }
 };
 
-/// Weights of a block from what its pixels have summed up.
+/// Of all pixels of a neighbourhood.
+struct SumNeighbourhoods {
+    static constexpr const char* kName = "optimal_sum";
+
+    OptimalState state;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        for (uint32_t v = 0; v < state.vertices; ++v) add_up(state, state.neighbourhoods, i, v, state.near_of(i, v));
+    }
+    /// The sums of the pixels of a block.
+    AMBILUX_HD static void add_up(const OptimalState& state, const PixelBlocks& blocks, uint32_t block, uint32_t vertex,
+                                  double* sums) {
+        const uint32_t words = state.words();
+        for (uint32_t k = 0; k < words; ++k) sums[k] = 0.0;
+        blocks.for_pixels(block, [&](uint32_t x, uint32_t y) {
+            const double* more = state.sums_of(y * blocks.width + x, vertex);
+            for (uint32_t k = 0; k < words; ++k) sums[k] += more[k];
+        });
+    }
+};
+
+/// Weights of a block from what its pixels have summed up, and those around it.
 struct SolveBlocks {
     static constexpr const char* kName = "optimal_solve";
 
@@ -107,12 +129,12 @@ struct SolveBlocks {
 
     AMBILUX_HD void operator()(uint32_t block) const {
         const PixelBlocks& b = state.blocks;
-        const uint32_t x = block % b.in_row() * b.side, y = block / b.in_row() * b.side;
+        const uint32_t middle_x = min(block % b.in_row() * b.side + b.side / 2, b.width - 1),
+                       middle_y = min(block / b.in_row() * b.side + b.side / 2, b.height - 1);
         for (uint32_t v = 0; v < state.vertices; ++v) {
-            double sums[StrategySums::words(EmitterStrategies::kMost)] = {};
-            for (uint32_t py = y; py < min(y + b.side, b.height); ++py)
-                for (uint32_t px = x; px < min(x + b.side, b.width); ++px)
-                    for (uint32_t k = 0; k < state.words(); ++k) sums[k] += state.sums_of(py * b.width + px, v)[k];
+            double sums[StrategySums::words(EmitterStrategies::kMost)];
+            SumNeighbourhoods::add_up(state, b, block, v, sums);
+            add_from_near(sums, state.near_of(state.neighbourhoods.of(middle_x, middle_y), v), state.words());
             Rgb advantages[EmitterStrategies::kMost];
             solve_strategies(sums, strategies, advantages);
             for (uint32_t k = 0; k < strategies.count; ++k) set_start(state.advantages_of(block, v)[k], advantages[k]);
