@@ -152,9 +152,10 @@ constexpr uint32_t phases_of() {
         return 1;
 }
 /// Iterations have the number of samples that the method says, whatever a device could hold: what is built in one phase
-/// is used in another, or the state follows from their number.
+/// is used in another, the state follows from their number, or the method says that it counts them (kKeepsIterations).
 template <class I>
-constexpr bool kWholeIterations = phases_of<I>() > 1 || I::State::kKind == StateKind::by_index;
+constexpr bool kWholeIterations =
+    phases_of<I>() > 1 || I::State::kKind == StateKind::by_index || requires { I::kKeepsIterations; };
 
 /// Runs one iteration of a method.
 template <class I, class Run>

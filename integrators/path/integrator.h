@@ -17,8 +17,9 @@ struct NoSettings {
 };
 
 /// `Sampling`: how eye vertices sample emitters, with `SamplingSettings` as its last member unless that is empty.
+/// `Learn`: see Occlude; SamplingSettings::learn() makes it.
 template <Features F, class Tracer, Fusion kFusion, template <Features, class, class> class Sampling = NextEvent,
-          class SamplingSettings = NoSettings, class Model = ModelFor<F, UnidirectionalMis>>
+          class SamplingSettings = NoSettings, class Model = ModelFor<F, UnidirectionalMis>, class Learn = LearnNothing>
 struct PathIntegrator {
     using Mis = Model;
     using RayItem = typename SubpathItems<Mis>::Ray;
@@ -44,18 +45,18 @@ struct PathIntegrator {
     using State = NoState;
     struct Memory {
         SubpathQueues<RayItem> subpaths;
-        EyeQueues<Mis> eye;
+        EyeQueues<Mis, Learn> eye;
     };
     /// Every queue holds the most it can ever be given: a slot has at most one item of each kind at a time.
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueues<Mis>::template lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.eye = EyeQueues<Mis, Learn>::template lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
         return m;
     }
 
     struct Stages {
-        using Eye = EyeSide<F, Tracer, kFusion>;
+        using Eye = EyeSide<F, Tracer, kFusion, Learn>;
         using Connect = Sampling<F, Mis, typename Eye::Candidates>;
         using ConnectHere = std::conditional_t<kFusion.occlude, Clocked<Connect>, Connect>;
         using AtVertex = std::conditional_t<kFusion.connect, ConnectHere, QueueVertex<F, Mis>>;
@@ -69,7 +70,7 @@ struct PathIntegrator {
         ConnectEmitter<F, Mis, Connect> connect_emitter;
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
-            : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves) {
+            : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves, learn_of(p)) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
             const SubpathQueues<RayItem>& q = m.subpaths;
@@ -92,6 +93,12 @@ struct PathIntegrator {
             }
         }
 
+        static Learn learn_of(const Policy& p) {
+            if constexpr (std::is_same_v<Learn, LearnNothing>)
+                return {};
+            else
+                return p.sampling.learn();
+        }
         Connect sampling(StageRecord* record, bool seeds) const {
             if constexpr (std::is_empty_v<SamplingSettings>)
                 return {eye.candidates(), record, seeds};

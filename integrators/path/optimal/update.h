@@ -1,0 +1,145 @@
+// Optimal weights: samples become those with the weights that were learned, and teach the next iteration.
+#pragma once
+
+#include "integrators/path/optimal/records.h"
+#include "integrators/path/optimal/state.h"
+#include "stages/update_film.h"
+
+namespace ambilux {
+
+/// Camera rays in slots that have no records yet.
+template <class Generate>
+struct GenerateRecorded : Generate {
+    StrategyRecords records{};
+
+    using Ray = typename Generate::Items::Ray;
+
+    AMBILUX_HD void operator()(uint32_t slot) const {
+        Ray ray;
+        if (make(slot, ray)) this->rays.push(ray);
+    }
+    AMBILUX_HD bool make(uint32_t slot, Ray& ray) const {
+        records.clear(slot);
+        return Generate::make(slot, ray);
+    }
+};
+
+/// What optimal weights add to those of the balance heuristic at a vertex, over its scale. A variate without mean: of
+/// what a sample has found, other strategies get a part in proportion to their densities, and the pick of a strategy is
+/// weighed against its probability.
+AMBILUX_HD Rgb optimal_difference(const VertexStrategies& v, const EmitterStrategies& all, const Lane* advantages) {
+    const Rgb picked = start_of<Rgb>(advantages[v.next_event_strategy]);
+    Rgb sum = picked * (v.next_event.other - 1.0f);
+    for (uint32_t k = 0; k < all.count; ++k) sum = sum + start_of<Rgb>(advantages[k]) * all.probability[k];
+    return sum - start_of<Rgb>(advantages[v.hit_strategy]) * v.hit.other;
+}
+
+/// Adds what the strategies of a vertex found to `sums` (StrategySums).
+AMBILUX_HD void add_to_sums(const VertexStrategies& v, double* sums) {
+    const double s = double(v.scale);
+    sums[StrategySums::kVertices] += 1.0;
+    sums[StrategySums::kScaleSquared] += s * s;
+    const auto add = [&](const FoundLight& light, uint32_t strategy, bool by_hit) {
+        if (is_zero(light.weighted)) return;
+        const double other = double(light.other), own = 1.0 - other, hit = by_hit ? own : other;
+        sums[StrategySums::overlap(strategy)] += s * s * own * other;
+        for (int c = 0; c < 3; ++c) {
+            const double y = s * double(light.weighted[c]);
+            sums[StrategySums::kHit + c] += y * hit;
+            sums[StrategySums::next_event(strategy) + c] += y * (1.0 - hit);
+        }
+    };
+    add(v.next_event, v.next_event_strategy, false);
+    add(v.hit, v.hit_strategy, true);
+}
+
+/// In the place of UpdateFilm, which finds nothing left to add: samples with optimal weights may be negative.
+struct AddOptimal {
+    static constexpr const char* kName = "optimal_film";
+
+    Wave wave;
+    EmitterStrategies strategies;
+    StrategyRecords records;
+    OptimalState state;
+    Lane* samples;
+    FilmSums film;
+    StageRecord* record;
+
+    /// `i` is a slot of the wave's first sample.
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const PathSlot p = wave.locate(i);
+        if (!p.active) return;
+        const uint32_t block = state.blocks.of(p.x, p.y), stride = wave.tiles * kTilePixels;
+        for (uint32_t k = 0; k < wave.state->samples; ++k) {
+            const uint32_t slot = i + k * stride;
+            Rgb value = start_of<Rgb>(samples[slot]);
+            for (uint32_t v = 0; v < state.vertices; ++v) {
+                const VertexStrategies vertex = records.items.load(records.place(slot, v + 1));
+                if (!(vertex.scale > 0.0f)) continue;
+                value = value + optimal_difference(vertex, strategies, state.advantages_of(block, v)) * vertex.scale;
+                add_to_sums(vertex, state.sums_of(p.pixel, v));
+            }
+            add(uint64_t(p.pixel) * 3, value);
+            samples[slot] = {};
+        }
+    }
+
+private:
+    AMBILUX_HD void add(uint64_t at, Rgb value) const {
+        if (!is_finite(value)) {
+            is_valid_radiance(value, record);  // counts it
+            return;
+        }
+        for (int c = 0; c < 3; ++c) {
+            film.sum[at + c] += double(value[c]);
+            film.sum_squares[at + c] += double(value[c]) * double(value[c]);
+        }
+    }
+};
+
+/// Of all pixels of a neighbourhood.
+struct SumNeighbourhoods {
+    static constexpr const char* kName = "optimal_sum";
+
+    OptimalState state;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        for (uint32_t v = 0; v < state.vertices; ++v) add_up(state, state.neighbourhoods, i, v, state.near_of(i, v));
+    }
+    /// The sums of the pixels of a block.
+    AMBILUX_HD static void add_up(const OptimalState& state, const PixelBlocks& blocks, uint32_t block, uint32_t vertex,
+                                  double* sums) {
+        const uint32_t words = state.words();
+        for (uint32_t k = 0; k < words; ++k) sums[k] = 0.0;
+        blocks.for_pixels(block, [&](uint32_t x, uint32_t y) {
+            const double* more = state.sums_of(y * blocks.width + x, vertex);
+            for (uint32_t k = 0; k < words; ++k) sums[k] += more[k];
+        });
+    }
+};
+
+/// Weights of a block from what its pixels have summed up, and those around it.
+struct SolveBlocks {
+    static constexpr const char* kName = "optimal_solve";
+
+    EmitterStrategies strategies;
+    OptimalState state;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t block) const {
+        const PixelBlocks& b = state.blocks;
+        const uint32_t middle_x = min(block % b.in_row() * b.side + b.side / 2, b.width - 1),
+                       middle_y = min(block / b.in_row() * b.side + b.side / 2, b.height - 1);
+        for (uint32_t v = 0; v < state.vertices; ++v) {
+            double sums[StrategySums::words(EmitterStrategies::kMost)];
+            SumNeighbourhoods::add_up(state, b, block, v, sums);
+            add_from_near(sums, state.near_of(state.neighbourhoods.of(middle_x, middle_y), v), state.words());
+            Rgb advantages[EmitterStrategies::kMost];
+            solve_strategies(sums, strategies, advantages);
+            for (uint32_t k = 0; k < strategies.count; ++k) set_start(state.advantages_of(block, v)[k], advantages[k]);
+        }
+    }
+};
+
+}  // namespace ambilux
