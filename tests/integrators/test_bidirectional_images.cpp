@@ -44,7 +44,7 @@ TEST_CASE("bdpt agrees with the path tracer on the project's scenes", "[bidirect
         uint32_t spp;
         double sees;
     };
-    for (auto [name, spp, sees] : first_or_all<Case>(4, {{"textured", 64, 0.05},
+    for (auto [name, spp, sees] : first_or_all<Case>(3, {{"textured", 64, 0.05},
                                                          {"materials", 96, 0.08},
                                                          {"lights", 64, 0.08},
                                                          {"glass", 512, 0.2},
@@ -124,7 +124,7 @@ TEST_CASE("B8, B13, B14, B17: direct light of every emitter on a plane by t = 1 
         std::string light;
         Image expected;
     };
-    const Case cases[] = {
+    const std::vector<Case> cases = {
         {"sphere", kSphereLight, plane_image(kLight, sphere_irradiance)},
         {"rectangle", lamp(0.6, 0.4, 0.2, 0.1, 1.2),
          plane_image(kLight, [](double x, double y) { return rectangle_irradiance(x, y, -0.4, 0.8, -0.3, 0.5, 1.2); })},
@@ -166,7 +166,7 @@ TEST_CASE("B8, B13, B14, B17: direct light of every emitter on a plane by t = 1 
     };
     for (const Case& c : cases) {
         const Scene scene = plane_under(c.light);
-        for (const Method& m : {kLightTracer, kAll, kPower}) {
+        for (const Method& m : first_or_all<Method>(2, {kLightTracer, kAll, kPower})) {
             INFO(c.name << " " << m.name);
             check_image(scene, method_settings(scene, m, 2), c.expected);
         }

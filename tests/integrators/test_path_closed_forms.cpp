@@ -276,12 +276,12 @@ TEST_CASE("Black shapes take from a sky what they would give as lamps", "[path]"
         rim.push_back({0.3 + a * double(f.s.x) + b * double(f.t.x), 0.4 + a * double(f.s.y) + b * double(f.t.y),
                        1.2 + a * double(f.s.z) + b * double(f.t.z)});
     }
-    const std::pair<std::string, std::function<double(double, double)>> shapes[] = {
+    const std::vector<std::pair<std::string, std::function<double(double, double)>>> shapes = {
         {kSphereLight, sphere_irradiance},
+        {tilted_disk, [&](double x, double y) { return polygon_irradiance(rim, x, y); }},
         {kRectangleLight, rectangle_irradiance},
-        {kDiskLight, disk_irradiance},
-        {tilted_disk, [&](double x, double y) { return polygon_irradiance(rim, x, y); }}};
-    for (const auto& [light, irradiance] : shapes) {
+        {kDiskLight, disk_irradiance}};
+    for (const auto& [light, irradiance] : first_or_all(2, shapes)) {
         const Image expected = plane_image(kLight, [&](double x, double y) { return M_PI - irradiance(x, y); });
         const Scene scene = plane_under(without_lamp(light) + sky);
         INFO(light);

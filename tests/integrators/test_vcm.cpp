@@ -6,6 +6,7 @@
 #include "integrators/bdpt/vcm/merge_keys.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
+#include "tests/support/long_run.h"
 #include "tests/support/merging_renders.h"
 #include "tests/support/whole_iterations.h"
 
@@ -21,7 +22,7 @@ const char* const kMerging[] = {"vcm", "bpm", "ppm", "sppm", "pm"};
 TEST_CASE("vcm: inside a glowing sphere all masks of strategies find the same radiance, whatever share merges have") {
     const Scene scene = glowing_sphere();
     for (const char* mask : {"all", "hits", "hits+next_event", "hits+light", "hits+connections+light"})
-        for (const char* heuristic : {"balance", "power"})
+        for (const char* heuristic : first_or_all<const char*>(1, {"balance", "power"}))
             for (const char* first : {"true", "false"}) {
                 RenderSettings s = vcm_settings(scene, "0.1");
                 apply_setting(s, "strategies", mask);
@@ -74,7 +75,7 @@ TEST_CASE(
 }
 
 TEST_CASE("All that merge have the mean of the path tracer, to within their bias") {
-    for (const char* name : {"cornell", "glass", "lights"}) {
+    for (const char* name : first_or_all<const char*>(2, {"cornell", "lights", "glass"})) {
         const Scene scene = project_scene(name, 32, 24);
         INFO(name);
         const Mean path = mean_over_seeds(scene, cpu_settings(scene, Estimator::mis), 128, 6);
