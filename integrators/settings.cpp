@@ -184,7 +184,7 @@ std::vector<Setting> estimator_settings() {
         sampler(),
         Is(Of::choice("heuristic", &S::heuristic, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)},
                       "heuristic of multiple importance sampling"))
-            .where(weighs, "nothing is weighted")
+            .where(weighs, "no strategies are weighted by a heuristic")
             .image_attribute(),
         groups,
         Is(Of::number("technique_depth", &S::technique_depth, 0u, kMaxStrategyDepth,
@@ -221,7 +221,7 @@ std::vector<Setting> estimator_settings() {
         Is(Of::number("cull", &S::cull, 0.0f, 1.0f,
                       "Russian roulette before shadow rays that would add less than this times what their path has "
                       "brought; 0: none"))
-            .where(culls, "there are no shadow rays to leave out"),
+            .where(culls, "there are no shadow rays that may be left out"),
     };
 }
 

@@ -61,14 +61,22 @@ struct Toy {
     static double balanced(const VertexStrategies& v) {
         return double(v.next_event.weighted.x) + double(v.hit.weighted.x);
     }
-    std::vector<double> sums(uint32_t samples, uint64_t seed) const {
-        std::vector<double> s(StrategySums::words(all.count));
-        for (uint32_t i = 0; i < samples; ++i) add_to_sums(sample(i, seed), s.data());
-        return s;
-    }
-    std::vector<Lane> solved(const std::vector<double>& s) const {
+    /// What so many samples teach.
+    std::vector<Lane> learned(OptimalLearning by, uint32_t samples, uint64_t seed) const {
+        const StrategyLearning learning = {all, by};
+        std::vector<double> pixel(learning.words()), block = pixel;
+        for (uint32_t i = 0; i < samples; ++i) learning.add_sample(sample(i, seed), pixel.data());
+        learning.add_pixel(block.data(), pixel.data());
         Rgb solution[EmitterStrategies::kMost];
-        solve_strategies(s.data(), all, solution);
+        learning.solve(block.data(), solution);
+        return lanes(solution);
+    }
+    std::vector<Lane> solved(const std::vector<double>& density_sums) const {
+        Rgb solution[EmitterStrategies::kMost];
+        DensitySums::solve(density_sums.data(), all, solution);
+        return lanes(solution);
+    }
+    std::vector<Lane> lanes(const Rgb* solution) const {
         std::vector<Lane> lanes(all.count);
         for (uint32_t k = 0; k < all.count; ++k) set_start(lanes[k], solution[k]);
         return lanes;
@@ -96,19 +104,19 @@ constexpr EmitterStrategies kOne = {1, {}, {1.0f}}, kTwo = {2, {0}, {0.3f, 0.7f}
 
 /// Of hits and next event estimation by integrals, which need no samples.
 std::vector<double> exact_sums(const Toy& toy) {
-    std::vector<double> s(StrategySums::words(toy.all.count));
+    std::vector<double> s(DensitySums::words(toy.all.count));
     constexpr int kSteps = 1 << 14;
     constexpr double kMany = 1e9;  // vertices, so that no prior counts
-    s[StrategySums::kVertices] = s[StrategySums::kScaleSquared] = kMany;
+    s[DensitySums::kVertices] = s[DensitySums::kScaleSquared] = kMany;
     for (uint32_t k = 0; k < toy.all.count; ++k)
         for (int i = 0; i < kSteps; ++i) {
             const double x = (i + 0.5) / kSteps, n = double(toy.all.probability[k]) * Toy::p(k, x), h = toy.q(k, x),
                          dx = kMany / kSteps, f = toy.light(k, x);
             if (!(f > 0)) continue;
-            s[StrategySums::overlap(k)] += dx * n * h / (n + h);
+            s[DensitySums::overlap(k)] += dx * n * h / (n + h);
             for (int c = 0; c < 3; ++c) {
-                s[StrategySums::kHit + c] += dx * f * h / (n + h);
-                s[StrategySums::next_event(k) + c] += dx * f * n / (n + h);
+                s[DensitySums::kHit + c] += dx * f * h / (n + h);
+                s[DensitySums::next_event(k) + c] += dx * f * n / (n + h);
             }
         }
     return s;
@@ -139,14 +147,38 @@ TEST_CASE("Light in proportion to a combination of densities has no variance, an
     }
 }
 
-TEST_CASE("What samples teach approaches the solution of the integrals") {
+TEST_CASE("What samples teach approaches the solution of the integrals, by densities and by least squares") {
     for (const EmitterStrategies& all : {kOne, kTwo})
         for (const auto light : {of_both, of_none}) {
             const Toy toy = {all, 0.8, light};
-            const std::vector<Lane> exact = toy.solved(exact_sums(toy)), learned = toy.solved(toy.sums(400'000, 1));
-            for (uint32_t k = 0; k < all.count; ++k)
-                CHECK(double(start_of<Rgb>(learned[k]).x) == Approx(double(start_of<Rgb>(exact[k]).x)).margin(0.03));
+            const std::vector<Lane> exact = toy.solved(exact_sums(toy));
+            for (const OptimalLearning by : {OptimalLearning::densities, OptimalLearning::least_squares}) {
+                const std::vector<Lane> learned = toy.learned(by, 400'000, 1);
+                for (uint32_t k = 0; k < all.count; ++k)
+                    CHECK(double(start_of<Rgb>(learned[k]).x) ==
+                          Approx(double(start_of<Rgb>(exact[k]).x)).margin(0.03));
+            }
         }
+}
+
+TEST_CASE(
+    "Least squares find a combination of densities from few samples, where those of densities are still far off") {
+    for (const EmitterStrategies& all : {kOne, kTwo}) {
+        const Toy toy = {all, 1.0, of_both};
+        const auto variance = [&](OptimalLearning by) {
+            double sum = 0;
+            for (uint64_t seed = 10; seed < 20; ++seed) {
+                const std::vector<Lane> few = toy.learned(by, 200, seed);
+                sum += toy.moments(&few, 2000, 3).second / 10;
+            }
+            return sum;
+        };
+        const double squares = variance(OptimalLearning::least_squares),
+                     densities = variance(OptimalLearning::densities), balanced = toy.moments(nullptr, 2000, 3).second;
+        INFO("variance " << squares << " by least squares, " << densities << " by densities, balanced " << balanced);
+        CHECK(squares < 2e-3 * balanced);  // the prior: (4 / 200)²
+        CHECK(squares < densities);
+    }
 }
 
 TEST_CASE("The solution has less variance than its neighbours, and any weights have the same mean") {
@@ -170,17 +202,23 @@ TEST_CASE("The solution has less variance than its neighbours, and any weights h
 
 TEST_CASE("Nothing found, nothing preferred; few samples and extreme sums stay finite") {
     Rgb solution[EmitterStrategies::kMost];
-    std::vector<double> s(StrategySums::words(2));
-    solve_strategies(s.data(), kTwo, solution);
+    std::vector<double> s(DensitySums::words(2));
+    DensitySums::solve(s.data(), kTwo, solution);
     CHECK((is_zero(solution[0]) && is_zero(solution[1])));
     for (const double scale : {1e-30, 1.0, 1e15})
         for (const double overlap : {0.0, 0.2, 0.5, 5.0}) {
             s.assign(s.size(), 0);
-            s[StrategySums::kVertices] = 2, s[StrategySums::kScaleSquared] = 2 * scale * scale;
-            s[StrategySums::overlap(0)] = 2 * scale * scale * overlap;
-            for (int c = 0; c < 3; ++c) s[StrategySums::next_event(0) + c] = scale;
-            solve_strategies(s.data(), kTwo, solution);
+            s[DensitySums::kVertices] = 2, s[DensitySums::kScaleSquared] = 2 * scale * scale;
+            s[DensitySums::overlap(0)] = 2 * scale * scale * overlap;
+            for (int c = 0; c < 3; ++c) s[DensitySums::next_event(0) + c] = scale;
+            DensitySums::solve(s.data(), kTwo, solution);
             CHECK((is_finite(solution[0]) && is_finite(solution[1])));
+        }
+    const Toy toy = {kTwo, 0.8, of_none};
+    for (const uint32_t samples : {0u, 1u, 2u, 3u, 4u})
+        for (const Lane& lane : toy.learned(OptimalLearning::least_squares, samples, 5)) {
+            const Rgb learned = start_of<Rgb>(lane);
+            CHECK((is_finite(learned) && max_component(learned) < 100));
         }
 }
 

@@ -38,16 +38,18 @@ struct PathOptimalIntegrator {
     static constexpr bool kKeepsIterations = true;  ///< they say what was known before a sample
 
     struct Policy : Path::Policy {
+        StrategyLearning learning;
         PixelBlocks blocks;
     };
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
-        Policy p = {Path::plan(scene, settings), {}};
+        Policy p = {Path::plan(scene, settings), {}, {}};
         const OptimalSettings& own = p.sampling.settings;
         p.rules.mis.estimator = Estimator::mis;
         p.rules.mis.heuristic = MisHeuristic::balance;
         p.rules.rr_depth = std::max(p.rules.rr_depth, own.vertices + 1);
         p.waves.iteration_samples = own.iteration_samples;
         p.sampling.strategies = emitter_strategies(scene, own.strategies);
+        p.learning = {p.sampling.strategies, own.learning};
         p.sampling.records.vertices = own.vertices;
         p.blocks = {scene.sensor.crop_width, scene.sensor.crop_height, own.block};
         return p;
@@ -80,10 +82,10 @@ struct PathOptimalIntegrator {
             for (int k = 0; k < 2; ++k)
                 hits[k] = {parts.scene, policy.rules, m.path.subpaths.hits[k],
                            strategies,  m.records,    note(NoteHits<F, Mis>::kName)};
-            add = {
-                parts.wave, strategies, m.records, state, parts.film.samples, parts.film.sums, note(AddOptimal::kName)};
-            sum = {state, note(SumNeighbourhoods::kName)};
-            solve = {strategies, state, note(SolveBlocks::kName)};
+            add = {parts.wave,      policy.learning,        m.records, state, parts.film.samples,
+                   parts.film.sums, note(AddOptimal::kName)};
+            sum = {policy.learning, state, note(SumNeighbourhoods::kName)};
+            solve = {policy.learning, state, note(SolveBlocks::kName)};
         }
 
     private:

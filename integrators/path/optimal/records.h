@@ -7,21 +7,6 @@
 
 namespace ambilux {
 
-/// Light that a sample found, times the weight of the balance heuristic.
-struct FoundLight {
-    Rgb weighted;
-    float other;  ///< weight of the other strategy for this light; 0 where there is none
-};
-
-/// A vertex that samples an emitter and a direction.
-struct VertexStrategies {
-    FoundLight next_event, hit;
-    float scale;  ///< of light at this vertex: how much of it the camera sees; 0: there is no such vertex
-    uint32_t next_event_strategy;
-    uint32_t hit_strategy;  ///< that could have found by next event estimation what the ray hit
-    uint32_t pad;
-};
-
 /// Those of a wave, `vertices` for each slot.
 struct StrategyRecords {
     LaneArray<VertexStrategies> items;

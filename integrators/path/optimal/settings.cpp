@@ -7,6 +7,10 @@ namespace ambilux {
 std::vector<Declaration<OptimalSettings>> PathOptimalVariant::settings() {
     using Of = Declare<OptimalSettings>;
     return {
+        Of::choice(
+            "optimal_learning", &OptimalSettings::learning, {"least_squares", "densities"},
+            "how weights follow from samples: by least squares of what they brought, or by integrals of products "
+            "of densities (Kondapaneni et al. 2019)"),
         Of::number("optimal_strategies", &OptimalSettings::strategies, 1u, OptimalSettings::kMostStrategies,
                    "strategies of next event estimation at most: the emitters that are picked most often are one each, "
                    "all others together are the last; 1: all are one"),

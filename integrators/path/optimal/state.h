@@ -2,7 +2,7 @@
 #pragma once
 
 #include "integrators/kept_state.h"
-#include "integrators/path/optimal/strategies.h"
+#include "integrators/path/optimal/learning.h"
 
 namespace ambilux {
 
@@ -27,24 +27,23 @@ struct OptimalState {
     static constexpr StateKind kKind = StateKind::per_device;
     static constexpr uint32_t kNeighbourhood = 8;  ///< side, in pixels
 
-    double* sums;      ///< [pixel][vertex][StrategySums], each pixel by itself: added up in the order of its samples
-    double* near;      ///< [neighbourhood][vertex][StrategySums]: of its pixels
-    Lane* advantages;  ///< [block][vertex][strategy]: solve_strategies
+    double* sums;  ///< [pixel][vertex][StrategyLearning], each pixel by itself: added up in the order of its samples
+    double* near;  ///< [neighbourhood][vertex][StrategyLearning]: of its pixels
+    Lane* advantages;  ///< [block][vertex][strategy]: StrategyLearning::solve
     PixelBlocks blocks, neighbourhoods;
-    uint32_t vertices, strategies;
+    uint32_t vertices, strategies, words;
 
-    AMBILUX_HD uint32_t words() const { return StrategySums::words(strategies); }
     AMBILUX_HD double* sums_of(uint32_t pixel, uint32_t vertex) const {
-        return sums + (uint64_t(pixel) * vertices + vertex) * words();
+        return sums + (uint64_t(pixel) * vertices + vertex) * words;
     }
     AMBILUX_HD double* near_of(uint32_t neighbourhood, uint32_t vertex) const {
-        return near + (uint64_t(neighbourhood) * vertices + vertex) * words();
+        return near + (uint64_t(neighbourhood) * vertices + vertex) * words;
     }
     AMBILUX_HD Lane* advantages_of(uint32_t block, uint32_t vertex) const {
         return advantages + (uint64_t(block) * vertices + vertex) * strategies;
     }
 
-    uint64_t sum_count() const { return uint64_t(blocks.width) * blocks.height * vertices * words(); }
+    uint64_t sum_count() const { return uint64_t(blocks.width) * blocks.height * vertices * words; }
     uint64_t advantage_count() const { return uint64_t(blocks.count()) * vertices * strategies; }
 
     template <class Policy>
@@ -53,9 +52,10 @@ struct OptimalState {
         s.blocks = p.blocks;
         s.neighbourhoods = {p.blocks.width, p.blocks.height, kNeighbourhood};
         s.vertices = p.sampling.settings.vertices;
-        s.strategies = p.sampling.strategies.count;
+        s.strategies = p.learning.all.count;
+        s.words = p.learning.words();
         s.sums = layout.allocate<double>(s.sum_count());
-        s.near = layout.allocate<double>(uint64_t(s.neighbourhoods.count()) * s.vertices * s.words());
+        s.near = layout.allocate<double>(uint64_t(s.neighbourhoods.count()) * s.vertices * s.words);
         s.advantages = layout.allocate<Lane>(s.advantage_count());
         return s;
     }

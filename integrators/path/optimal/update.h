@@ -34,31 +34,12 @@ AMBILUX_HD Rgb optimal_difference(const VertexStrategies& v, const EmitterStrate
     return sum - start_of<Rgb>(advantages[v.hit_strategy]) * v.hit.other;
 }
 
-/// Adds what the strategies of a vertex found to `sums` (StrategySums).
-AMBILUX_HD void add_to_sums(const VertexStrategies& v, double* sums) {
-    const double s = double(v.scale);
-    sums[StrategySums::kVertices] += 1.0;
-    sums[StrategySums::kScaleSquared] += s * s;
-    const auto add = [&](const FoundLight& light, uint32_t strategy, bool by_hit) {
-        if (is_zero(light.weighted)) return;
-        const double other = double(light.other), own = 1.0 - other, hit = by_hit ? own : other;
-        sums[StrategySums::overlap(strategy)] += s * s * own * other;
-        for (int c = 0; c < 3; ++c) {
-            const double y = s * double(light.weighted[c]);
-            sums[StrategySums::kHit + c] += y * hit;
-            sums[StrategySums::next_event(strategy) + c] += y * (1.0 - hit);
-        }
-    };
-    add(v.next_event, v.next_event_strategy, false);
-    add(v.hit, v.hit_strategy, true);
-}
-
 /// In the place of UpdateFilm, which finds nothing left to add: samples with optimal weights may be negative.
 struct AddOptimal {
     static constexpr const char* kName = "optimal_film";
 
     Wave wave;
-    EmitterStrategies strategies;
+    StrategyLearning learning;
     StrategyRecords records;
     OptimalState state;
     Lane* samples;
@@ -76,8 +57,8 @@ struct AddOptimal {
             for (uint32_t v = 0; v < state.vertices; ++v) {
                 const VertexStrategies vertex = records.items.load(records.place(slot, v + 1));
                 if (!(vertex.scale > 0.0f)) continue;
-                value = value + optimal_difference(vertex, strategies, state.advantages_of(block, v)) * vertex.scale;
-                add_to_sums(vertex, state.sums_of(p.pixel, v));
+                value = value + optimal_difference(vertex, learning.all, state.advantages_of(block, v)) * vertex.scale;
+                learning.add_sample(vertex, state.sums_of(p.pixel, v));
             }
             add(uint64_t(p.pixel) * 3, value);
             samples[slot] = {};
@@ -101,20 +82,20 @@ private:
 struct SumNeighbourhoods {
     static constexpr const char* kName = "optimal_sum";
 
+    StrategyLearning learning;
     OptimalState state;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        for (uint32_t v = 0; v < state.vertices; ++v) add_up(state, state.neighbourhoods, i, v, state.near_of(i, v));
+        for (uint32_t v = 0; v < state.vertices; ++v)
+            add_up(learning, state, state.neighbourhoods, i, v, state.near_of(i, v));
     }
     /// The sums of the pixels of a block.
-    AMBILUX_HD static void add_up(const OptimalState& state, const PixelBlocks& blocks, uint32_t block, uint32_t vertex,
-                                  double* sums) {
-        const uint32_t words = state.words();
-        for (uint32_t k = 0; k < words; ++k) sums[k] = 0.0;
+    AMBILUX_HD static void add_up(const StrategyLearning& learning, const OptimalState& state,
+                                  const PixelBlocks& blocks, uint32_t block, uint32_t vertex, double* sums) {
+        for (uint32_t k = 0; k < state.words; ++k) sums[k] = 0.0;
         blocks.for_pixels(block, [&](uint32_t x, uint32_t y) {
-            const double* more = state.sums_of(y * blocks.width + x, vertex);
-            for (uint32_t k = 0; k < words; ++k) sums[k] += more[k];
+            learning.add_pixel(sums, state.sums_of(y * blocks.width + x, vertex));
         });
     }
 };
@@ -123,7 +104,7 @@ struct SumNeighbourhoods {
 struct SolveBlocks {
     static constexpr const char* kName = "optimal_solve";
 
-    EmitterStrategies strategies;
+    StrategyLearning learning;
     OptimalState state;
     StageRecord* record;
 
@@ -132,12 +113,13 @@ struct SolveBlocks {
         const uint32_t middle_x = min(block % b.in_row() * b.side + b.side / 2, b.width - 1),
                        middle_y = min(block / b.in_row() * b.side + b.side / 2, b.height - 1);
         for (uint32_t v = 0; v < state.vertices; ++v) {
-            double sums[StrategySums::words(EmitterStrategies::kMost)];
-            SumNeighbourhoods::add_up(state, b, block, v, sums);
-            add_from_near(sums, state.near_of(state.neighbourhoods.of(middle_x, middle_y), v), state.words());
+            double sums[StrategyLearning::kMostWords];
+            SumNeighbourhoods::add_up(learning, state, b, block, v, sums);
+            learning.add_from_near(sums, state.near_of(state.neighbourhoods.of(middle_x, middle_y), v));
             Rgb advantages[EmitterStrategies::kMost];
-            solve_strategies(sums, strategies, advantages);
-            for (uint32_t k = 0; k < strategies.count; ++k) set_start(state.advantages_of(block, v)[k], advantages[k]);
+            learning.solve(sums, advantages);
+            for (uint32_t k = 0; k < learning.all.count; ++k)
+                set_start(state.advantages_of(block, v)[k], advantages[k]);
         }
     }
 };
