@@ -14,6 +14,7 @@ RenderSettings guided(const Scene& scene, uint64_t seed) {
     RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
     s.variant = "guided";
     apply_setting(s, "guide_split", "256");
+    apply_setting(s, "guide_samples", "4");
     apply_setting(s, "deterministic", "true");
     return s;
 }

@@ -112,11 +112,10 @@ TEST_CASE("A learned density integrates to one, and is that of what is sampled")
         CHECK(whole == Approx(1).epsilon(1e-5));
         for (uint32_t i = 0; i < kSamples; ++i) {
             const Vec4f u = random_floats({2, i, 0, Stream::test}, 0);
-            float pdf_sa;
-            const Vec3f d = tree.sample(0, {u.x, u.y}, pdf_sa);
-            const Vec2f at = square_of_direction(d);
-            CHECK(pdf_sa > 0);
-            differ += std::fabs(tree.pdf_sa(0, d) / pdf_sa - 1) > 1e-5f;
+            const GuideQuads::Cell sampled = tree.quads.descend(0, {u.x, u.y}, true);
+            const Vec2f at = sampled.at;
+            CHECK(sampled.density > 0);
+            differ += std::fabs(tree.pdf_sa(0, square_to_sphere(at)) / (kInv4Pi * sampled.density) - 1) > 1e-5f;
             observed[uint32_t(at.y * kSide) * kSide + uint32_t(at.x * kSide)] += 1;
         }
         CHECK(differ < 20);  // rounded into another cell
@@ -161,13 +160,14 @@ TEST_CASE("What brought no light leaves the trees as they were") {
 }
 
 TEST_CASE("What roulette goes by are means of what was recorded since the last update, and of all samples of a tile") {
+    constexpr int64_t kWeight(LearnRecords::kWeight);
     Trees trees(GuidedSettings{});
     trees.state.progress->unit[uint32_t(GuideSum::radiance)] = 0.5f;
     for (const int64_t light : {3, 7}) {
         trees.learn([&](uint32_t leaf) {
             trees.put(leaf, {0, 0, 1}, 5);
-            trees.state.reflected[0] += 8, trees.state.reflected[1] += 8 * light;
-            trees.state.tiles[2] += 64, trees.state.tiles[3] += 64 * light;
+            trees.state.reflected[0] += 8 * kWeight, trees.state.reflected[1] += 8 * light;
+            trees.state.tiles[2] += 64 * kWeight, trees.state.tiles[3] += 64 * light;
         });
         CHECK(trees.state.tree.leaves[0].reflected == 0.5f * float(light));
     }

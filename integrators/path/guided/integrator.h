@@ -3,6 +3,7 @@
 // Guiding in Production", chapter 10; Rath et al. 2020, "Variance-Aware Path Guiding").
 #pragma once
 
+#include "accel/host_tracer.h"
 #include "integrators/path/guided/update.h"
 #include "integrators/path/integrator.h"
 
@@ -16,6 +17,7 @@ struct PathGuidedIntegrator {
     static constexpr bool kFilmWide = false;
     static constexpr uint32_t kPhases = kGuideRounds + 1;
     static constexpr uint32_t kTrainingPaths = 1u << 20;  ///< of an iteration, at most
+    static constexpr uint32_t kMostSamples = 256;         ///< of an iteration, unless it is told
 
     struct Policy : Path::Policy {
         GuidedSettings guided;
@@ -23,8 +25,10 @@ struct PathGuidedIntegrator {
     };
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
         Policy p = {Path::plan(scene, settings), GuidedSettings::plan(settings), {}};
-        p.waves.iteration_samples = p.guided.iteration_samples;
         const Sensor& s = scene.sensor;
+        if (p.guided.iteration_samples == 0)
+            p.guided.iteration_samples = iteration_samples(uint64_t(s.crop_width) * s.crop_height, settings);
+        p.waves.iteration_samples = p.guided.iteration_samples;
         p.training.tiles = ((s.crop_width + kTileSide - 1) / kTileSide) * ((s.crop_height + kTileSide - 1) / kTileSide);
         const uint64_t paths = uint64_t(s.crop_width) * s.crop_height * p.guided.iteration_samples;
         while (p.training.shift < kMostShift && paths >> p.training.shift > kTrainingPaths) ++p.training.shift;
@@ -63,7 +67,8 @@ struct PathGuidedIntegrator {
             rekey(s.train, s.train.extend[0], s.train.extend[1], s.train.eye_vertex[0], s.train.eye_vertex[1],
                   s.train.connect_emitter, s.generate_training, s.learn);
             s.generate_training.round = round;
-            s.generate_training.share = s.learn.share = kGuideRounds - 1 - round;
+            s.generate_training.share = s.learn.share =
+                min(s.learn.training.shift + kGuideRounds - 1 - round, kMostShift);
             s.learn.round = round;
             return s;
         }
@@ -122,6 +127,17 @@ struct PathGuidedIntegrator {
 private:
     static constexpr uint32_t kMostShift = 6;  ///< of GuideTraining: one slot of a tile
 
+    /// Where guide_samples leaves it open, a power of two: that of a film of so many pixels, and if it is known how
+    /// many samples there will be, one that divides them and lets trees become better several times.
+    static uint32_t iteration_samples(uint64_t pixels, const RenderSettings& settings) {
+        const uint64_t paths = std::is_same_v<Tracer, HostTracer> ? 1u << 18 : 1u << 23,
+                       samples = settings.expected_samples;
+        uint32_t n = 1;
+        while (n < kMostSamples && 2 * n * pixels <= paths) n *= 2;
+        while (n > 1 && samples > 0 && (samples % n != 0 || 8 * uint64_t(n) > samples)) n /= 2;
+        return n;
+    }
+
     /// One wave. `kFused`: camera rays are made and traced at once, in all slots.
     template <bool kFused, class Executor, class Generate>
     static void paths(Executor& exec, const Stages& s, const typename Path::Stages& p, const Generate& generate) {
@@ -138,7 +154,7 @@ private:
             },
             [&](int k, const auto&) { exec.for_each(s.record[k], s.record[k].hits); });
         exec.set_depth(0);
-        exec.run_slots(s.learn, slots);
+        exec.run_slots(s.learn, slots >> s.learn.training.shift);
     }
     template <class Executor>
     static void learn(Executor& exec, const Stages& s, uint32_t round) {

@@ -16,26 +16,39 @@ struct GuideTraining {
     uint32_t tiles;  ///< of the film
 
     AMBILUX_HD bool trains(const Wave& wave, uint32_t slot, uint32_t by) const {
-        const uint32_t pick = hash_word({tile(wave, slot), wave.state->first_sample + wave.sample_of(slot),
-                                         uint32_t(wave.seed), uint32_t(wave.seed >> 32)});
-        return ((slot ^ pick) & ((1u << by) - 1)) == 0;
+        return ((slot ^ pick(wave, slot)) & ((1u << by) - 1)) == 0;
     }
     AMBILUX_HD bool trains(const Wave& wave, uint32_t slot) const { return trains(wave, slot, shift); }
     AMBILUX_HD static uint32_t tile(const Wave& wave, uint32_t slot) {
         return wave.state->first_tile + slot / kTilePixels - wave.sample_of(slot) * wave.tiles;
     }
+    /// The slot that trains among those of number `group`, 2^shift together.
+    AMBILUX_HD uint32_t slot_of(const Wave& wave, uint32_t group) const {
+        const uint32_t first = group << shift;
+        return first | (pick(wave, first) & ((1u << shift) - 1));
+    }
     /// Of records in a wave of so many slots.
     AMBILUX_HD uint32_t places(uint32_t slots) const { return (slots >> shift) * kDepths; }
     AMBILUX_HD uint32_t place(uint32_t slot) const { return (slot >> shift) * kDepths; }
+
+private:
+    /// The same for all slots of a tile and sample.
+    AMBILUX_HD static uint32_t pick(const Wave& wave, uint32_t slot) {
+        return hash_word({tile(wave, slot), wave.state->first_sample + wave.sample_of(slot), uint32_t(wave.seed),
+                          uint32_t(wave.seed >> 32)});
+    }
 };
 
 /// A scattered ray.
 struct GuideRecord {
-    Vec3f p;
-    float pdf_sa;         ///< of its direction
-    uint32_t direction;   ///< in the unit square, twice 16 bits
-    float brought;        ///< luminance that the path had brought before
-    float before, after;  ///< luminance of its throughput before it was scattered and after
+    uint32_t leaf;       ///< where it was scattered
+    uint32_t direction;  ///< in the unit square, twice 16 bits
+    float pdf_sa;        ///< of it
+    float brought;       ///< luminance that the path had brought before
+    float before;        ///< luminance of its throughput before it was scattered
+    float whole;         ///< and after it, without roulette
+    float survival;      ///< of roulette
+    uint32_t pad;
 
     AMBILUX_HD static uint32_t pack(Vec2f d) { return uint32_t(d.x * 0x1p16f) | uint32_t(d.y * 0x1p16f) << 16; }
     AMBILUX_HD Vec2f place() const {
@@ -65,9 +78,8 @@ struct GenerateGuided : Generate {
     AMBILUX_HD bool make(uint32_t slot, Ray& ray) const {
         if (!Generate::make(slot, ray)) return false;
         if (training.trains(this->wave, slot)) made[slot >> training.shift] = 0;
-        GuidedSums sums = {};
-        sums.over_pixel = over_pixel[GuideTraining::tile(this->wave, slot)];
-        ray.more = Ray::Sums::pack(sums).more;
+        const float expected = over_pixel[GuideTraining::tile(this->wave, slot)];
+        ray.more = Ray::Sums::pack(GuidedSums::of(GuidedSums::OfRay{0, 0.0f, 0.0f, expected}, 0.0f)).more;
         return true;
     }
 };
@@ -107,25 +119,29 @@ struct RecordRays {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         if (wave.state->depth < 2 || wave.state->depth - 2 >= GuideTraining::kDepths) return;
+        const RayItem start = hits.items.load(i, 2).ray;  // of most no more is needed
+        const uint32_t depth = start.bits.depth();
+        if (start.bits.delta() || !training.trains(wave, start.path)) return;
         const RayItem ray = hits.load(i).ray;
-        const uint32_t depth = ray.bits.depth();
-        if (ray.bits.delta() || !training.trains(wave, ray.path)) return;
         const Subpath<Mis> path = Items::unpack(ray);
-        const float pdf_sa = path.sums.pdf_sa, before = path.sums.before, after = luminance(path.throughput);
-        if (!(pdf_sa > 0.0f && pdf_sa < kInfinity && before > 0.0f && after > 0.0f)) return;
+        const GuidedSums::OfRay sums = path.sums.of_ray();
+        const float pdf_sa = path.sums.pdf_sa, after = luminance(path.throughput);
+        if (!(pdf_sa > 0.0f && pdf_sa < kInfinity && sums.before > 0.0f && sums.whole > 0.0f && after > 0.0f)) return;
         records.made[ray.path >> training.shift] |= 1u << (depth - 2);
-        records.of_vertices.store(training.place(ray.path) + depth - 2,
-                                  {path.origin, pdf_sa, GuideRecord::pack(square_of_direction(path.direction)),
-                                   luminance(start_of<Rgb>(samples[ray.path])), before, after});
+        records.of_vertices.store(
+            training.place(ray.path) + depth - 2,
+            {sums.leaf, GuideRecord::pack(square_of_direction(path.direction)), pdf_sa,
+             luminance(start_of<Rgb>(samples[ray.path])), sums.before, sums.whole, min(sums.whole / after, 1.0f), 0});
     }
 };
 
-/// Adds the records of a slot to the sums of the trees.
+/// Adds the records of the slot that trains in a group to the sums of the trees.
 struct LearnRecords {
     static constexpr const char* kName = "guide_learn";
     /// Of the mean in units, and the most that one value counts: sums of 2^25 such values are no more than integers
     /// hold.
     static constexpr float kMean = 0x1p16f, kMost = 0x1p38f;
+    static constexpr float kWeight = 0x1p8f;  ///< units of a weight
 
     Wave wave;
     GuideTraining training;
@@ -137,23 +153,23 @@ struct LearnRecords {
     uint32_t share = 0;  ///< as of GenerateTraining
     uint32_t round = kGuideRounds;
 
-    AMBILUX_HD void operator()(uint32_t slot) const {
-        if (state.progress->rounds != round || !training.trains(wave, slot, max(share, training.shift))) return;
-        if (!wave.locate(slot).active) return;
+    AMBILUX_HD void operator()(uint32_t group) const {
+        if (state.progress->rounds != round) return;
+        const uint32_t slot = training.slot_of(wave, group);
+        if (!training.trains(wave, slot, max(share, training.shift)) || !wave.locate(slot).active) return;
         const float brought = luminance(start_of<Rgb>(samples[slot]));
-        add(state.tiles + 2 * GuideTraining::tile(wave, slot), brought);
+        add(state.tiles + 2 * GuideTraining::tile(wave, slot), brought, 1.0f);
         const uint32_t made = records.made[slot >> training.shift];
         for (uint32_t k = 0; made >> k; ++k) {
             if (!(made >> k & 1u)) continue;
             const GuideRecord r = records.of_vertices.load(training.place(slot) + k);
-            const float found = max(brought - r.brought, 0.0f), squared = sqr(found / r.before);
+            const float found = max(brought - r.brought, 0.0f), q = r.survival, b = found / r.before;
+            const float squared = sqr(b) * q;
             if (!(squared < kInfinity)) continue;
-            const Vec3f x = state.tree.unit(r.p);
-            const GuideTree::Place at = state.tree.find(x);
-            add(state.reflected + 2 * at.leaf, found / r.before);
-            learn_share(r, at.leaf, squared);
-            learn(slot, k, r, x, at.depth,
-                  settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.after * r.pdf_sa));
+            add(state.reflected + 2 * r.leaf, b, 1.0f / q);
+            learn_share(r, squared);
+            learn(slot, k, r,
+                  settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.whole * r.pdf_sa));
         }
     }
 
@@ -167,56 +183,47 @@ private:
                 state.exponents + uint32_t(sum) * GuidedState::kExponents + (float_bits(value) >> kFractionBits), 1);
         return 0.0f;
     }
-    /// A radiance to a count and a sum.
-    AMBILUX_HD void add(int64_t* sum, float radiance) const {
+    /// A radiance to a sum of `weight` and of the radiances.
+    AMBILUX_HD void add(int64_t* sum, float radiance, float weight) const {
         const float units = in_units(GuideSum::radiance, radiance);
         if (!(units < kInfinity) || state.progress->unit[uint32_t(GuideSum::radiance)] == 0.0f) return;
-        fetch_add_shared(sum, 1);
+        fetch_add_shared(sum, int64_t(weight * kWeight + 0.5f));
         if (units > 0.0f) fetch_add_shared(sum + 1, int64_t(min(units, kMost)));
     }
     /// What the second moment would have been with other shares of the BSDF (GuideShares).
-    AMBILUX_HD void learn_share(const GuideRecord& r, uint32_t leaf, float squared) const {
+    AMBILUX_HD void learn_share(const GuideRecord& r, float squared) const {
         const float units = in_units(GuideSum::moment, squared);
         if (!settings.learn_share || !(units > 0.0f)) return;
         const GuideTree& tree = state.tree;
-        const float now = tree.leaves[leaf].bsdf_share;
+        const float now = tree.leaves[r.leaf].bsdf_share;
         if (now == 1.0f) return;
-        const float guide = kInv4Pi * tree.quads.cell(leaf, r.place()).density,
+        const float guide = kInv4Pi * tree.quads.cell(r.leaf, r.place()).density,
                     bsdf = max(r.pdf_sa - (1.0f - now) * guide, 0.0f) / now;
         for (uint32_t k = 0; k < GuideShares::kCount; ++k) {
             const float other = GuideShares::of(k), pdf_sa = other * bsdf + (1.0f - other) * guide;
-            fetch_add_shared(state.shares + leaf * GuideShares::kCount + k,
+            fetch_add_shared(state.shares + r.leaf * GuideShares::kCount + k,
                              int64_t(min(units * (r.pdf_sa / pdf_sa), GuideShares::kMost)));
         }
     }
-    /// Of a record at `x` in the unit cube, in a leaf of this depth.
-    AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, Vec3f x, uint32_t depth, float value) const {
+    AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, float value) const {
         const float units = min(in_units(GuideSum::target, value), kMost);
         if (!(units >= 1.0f)) return;
         const GuideTree& tree = state.tree;
         // Blocks of random numbers beyond those of RandomNumbers.
         const RngKey key = wave.key(slot);
         constexpr uint32_t kFirstBlock = 0x20000u;
-        if (settings.filter) {
-            const Vec4f u = random_floats(key, kFirstBlock + 2 * k);
-            const Vec3f side = tree.sides(depth);
-            x = {moved(x.x, side.x, u.x), moved(x.y, side.y, u.y), moved(x.z, side.z, u.z)};
-        }
-        const uint32_t leaf = tree.find(x).leaf;
         Vec2f d = r.place();
-        GuideQuads::Cell cell = tree.quads.cell(leaf, d);
+        GuideQuads::Cell cell = tree.quads.cell(r.leaf, d);
         if (settings.filter) {
-            const Vec4f u = random_floats(key, kFirstBlock + 2 * k + 1);
+            const Vec4f u = random_floats(key, kFirstBlock + k);
             const float side = GuideQuads::side(cell.level), y = d.y + side * (u.y - 0.5f);
-            d = {moved(d.x, side, u.x), clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)};
-            cell = tree.quads.cell(leaf, d);
+            d = {clamp(d.x + side * (u.x - 0.5f), 0.0f, kOneMinusEpsilon),
+                 clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)};
+            cell = tree.quads.cell(r.leaf, d);
         }
-        const uint64_t place = (leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
+        const uint64_t place = (r.leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
         fetch_add_shared(state.found + place, 1);
         fetch_add_shared(state.sums + place, int64_t(units));
-    }
-    AMBILUX_HD static float moved(float x, float side, float u) {
-        return clamp(x + side * (u - 0.5f), 0.0f, kOneMinusEpsilon);
     }
 };
 

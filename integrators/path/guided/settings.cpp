@@ -19,18 +19,20 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
             "guide_roulette", &GuidedSettings::roulette,
             "Russian roulette goes by what a path is expected to bring, over what its pixel is expected to be (Vorba "
             "and Křivánek 2016); false: by throughput"),
-        Of::flag("guide_filter", &GuidedSettings::filter,
-                 "what a path has found is learned at a random place within the cell around it (Müller 2019)"),
+        Of::flag(
+            "guide_filter", &GuidedSettings::filter,
+            "what a path has found is learned at a random direction within the cell around it (Müller 2019, without "
+            "his filter over space)"),
         Of::number(
             "guide_split", &GuidedSettings::split, 16u, 1u << 24,
             "records that brought light to a leaf above which it splits in the first round of training; in round "
             "k sqrt(2^k) times as many"),
         Of::number("guide_leaves", &GuidedSettings::most_leaves, 1u, 1u << 16,
-                   "leaves of the tree over space, at most, of 14 KiB each"),
-        Of::number("guide_samples", &GuidedSettings::iteration_samples, 1u, 1024u,
-                   "samples of every pixel in one iteration; training before the first takes up to twice as many. A "
-                   "device wants "
-                   "two million paths in one: 32 at 320x180"),
+                   "leaves of the tree over space, at most, of 13 KiB each"),
+        Of::number("guide_samples", &GuidedSettings::iteration_samples, 0u, 1024u,
+                   "samples of every pixel in one iteration; training before the first takes up to twice as many. 0: "
+                   "by the size of the film, so that a device has eight million paths in one, a CPU 250 thousand, but "
+                   "at most an eighth of the samples that are asked for, and a divisor of their number"),
     };
 }
 

@@ -18,10 +18,10 @@ struct GuidedSettings {
     float bsdf_share = 0.5f;         ///< of directions that the BSDF samples, at first
     bool learn_share = true;         ///< every leaf has a share of its own from the second update on
     bool roulette = true;            ///< by what paths are expected to bring
-    bool filter = true;              ///< what was learned is spread over the cells around it
-    uint32_t split = 100;            ///< records that brought light to a leaf above which it splits, in the first round
+    bool filter = true;              ///< what was learned is spread over the directions around it
+    uint32_t split = 32;             ///< records that brought light to a leaf above which it splits, in the first round
     uint32_t most_leaves = 8192;     ///< of the tree over space
-    uint32_t iteration_samples = 4;  ///< samples of every pixel in one iteration
+    uint32_t iteration_samples = 0;  ///< samples of every pixel in one iteration; 0: by the size of the film
 
     static GuidedSettings plan(const RenderSettings& settings);
 };

@@ -28,6 +28,14 @@ struct GuideShares {
     AMBILUX_HD static float of(uint32_t k) { return 0.125f + 0.875f * (float(k) + 0.5f) / float(kCount); }
 };
 
+/// Of an update: quadtrees as they were, with masses of quadrants.
+struct GuideMasses {
+    Lane* masses;        ///< [leaf][node]
+    uint32_t* children;  ///< as of GuideQuads::Node
+
+    AMBILUX_HD Vec4f of(uint32_t node) const { return start_of<Vec4f>(masses[node]); }
+};
+
 /// How far learning has come.
 struct alignas(16) GuideProgress {
     uint32_t rounds;         ///< of training that are done
@@ -43,7 +51,7 @@ struct GuidedState {
     static constexpr uint32_t kExponents = 256;
 
     GuideTree tree;
-    GuideQuads old;  ///< of an update: quadtrees as they were, with masses
+    GuideMasses old;
     GuideProgress* progress;
     int64_t* sums;   ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
     int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
@@ -63,8 +71,9 @@ struct GuidedState {
         const uint32_t n = p.guided.most_leaves, nodes = n * GuideQuads::kNodes;
         GuidedState s{};
         s.tree.space = layout.allocate<uint32_t>(2 * n);
+        s.tree.grid = layout.allocate<uint32_t>(GuideTree::kGridCells);
         s.tree.leaves = layout.allocate<GuideLeaf>(n);
-        s.tree.quads = {layout.allocate<Lane>(nodes), layout.allocate<uint32_t>(nodes)};
+        s.tree.quads = {layout.allocate<Lane>(nodes)};
         s.old = {layout.allocate<Lane>(nodes), layout.allocate<uint32_t>(nodes)};
         s.progress = layout.allocate<GuideProgress>(1);
         s.sums = layout.allocate<int64_t>(4ull * nodes);
@@ -85,6 +94,7 @@ struct GuidedState {
     template <class Policy, class Put>
     void init(const Policy&, Put put) const {
         put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
+        put(tree.grid, std::vector<uint32_t>(GuideTree::kGridCells, GuideTree::kLeafBit));
         put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1, 1.0f, 0.0f}});
         put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0}});
     }
@@ -93,9 +103,9 @@ struct GuidedState {
         const uint64_t n = most_leaves, nodes = n * GuideQuads::kNodes;
         visit("guide_progress", progress, 1);
         visit("guide_space", tree.space, 2 * n);
+        visit("guide_grid", tree.grid, uint64_t(GuideTree::kGridCells));
         visit("guide_leaves", tree.leaves, n);
-        visit("guide_masses", tree.quads.masses, nodes);
-        visit("guide_children", tree.quads.children, nodes);
+        visit("guide_nodes", tree.quads.nodes, nodes);
         visit("guide_sums", sums, 4 * nodes);
         visit("guide_found", found, 4 * nodes);
         visit("guide_shares", shares, n * GuideShares::kCount);

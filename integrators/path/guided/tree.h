@@ -29,67 +29,67 @@ AMBILUX_HD Vec2f square_of_direction(Vec3f d) {
     return {clamp(0.5f - 0.5f * d.z, 0.0f, kOneMinusEpsilon), clamp(turn_of(d.x, d.y), 0.0f, kOneMinusEpsilon)};
 }
 
-/// Which of two parts `u` in [0,1) falls to, the first with probability `first`; `u` is uniform again after it.
-AMBILUX_HD uint32_t pick_half(float first, float& u) {
-    const bool second = !(u < first);
-    u = second ? (u - first) / (1.0f - first) : u / first;
-    u = clamp(u, 0.0f, kOneMinusEpsilon);
-    return second;
-}
-
 /// A quadtree has its nodes one after the other, parents before children. A node has four quadrants, x + 2y, each of
 /// which is a cell or a node in turn.
 struct GuideQuads {
     static constexpr uint32_t kNodes = 128;  ///< of a quadtree, at most
     static constexpr uint32_t kLevels = 12;  ///< cells are no smaller than what rounding of a direction leaves
 
-    Lane* masses;        ///< [leaf][node]: probabilities of the four quadrants
-    uint32_t* children;  ///< [leaf][node]: node of each quadrant, a byte each; 0: a cell
+    /// One lane, so that a level of a descent is one load.
+    struct Node {
+        float left;                     ///< probability of the two quadrants of lower x
+        float lower_left, lower_right;  ///< of the lower y, among the two of lower x and among the others
+        uint32_t children;              ///< node of each quadrant, a byte each; 0: a cell
+    };
+    Lane* nodes;  ///< [leaf][node]
 
     /// A cell: a quadrant of a node of the quadtree of a leaf; its side is 2^-level.
     struct Cell {
         uint32_t node, quadrant, level;
         float density;  ///< per area of the square
+        Vec2f at;       ///< the point
     };
 
     AMBILUX_HD static float side(uint32_t level) {
         return bits_float(FloatBits(kExponentBias - level) << kFractionBits);
     }
     AMBILUX_HD static uint32_t child(uint32_t children, uint32_t quadrant) { return children >> 8 * quadrant & 0xffu; }
-    AMBILUX_HD Vec4f probabilities(uint32_t at) const { return start_of<Vec4f>(masses[at]); }
     AMBILUX_HD static float of(Vec4f m, uint32_t quadrant) {
         const float low = quadrant & 1u ? m.y : m.x, high = quadrant & 1u ? m.w : m.z;
         return quadrant & 2u ? high : low;
     }
-    AMBILUX_HD Cell cell(uint32_t leaf, Vec2f u) const {
-        Cell c = {0, 0, 0, 1.0f};
-        for (uint32_t node = 0;;) {
-            const uint32_t at = leaf * kNodes + node;
-            u = {2.0f * u.x, 2.0f * u.y};
-            const uint32_t x = u.x >= 1.0f, y = u.y >= 1.0f;
-            u = {u.x - float(x), u.y - float(y)};
-            c = {node, x + 2 * y, c.level + 1, c.density * 4.0f * of(probabilities(at), x + 2 * y)};
-            node = child(children[at], c.quadrant);
-            if (node == 0) return c;
+    /// Of probabilities of the four quadrants.
+    AMBILUX_HD static Node node(Vec4f p, uint32_t children) {
+        return {(p.x + p.z) / ((p.x + p.z) + (p.y + p.w)), p.x / (p.x + p.z), p.y / (p.y + p.w), children};
+    }
+    /// Down to the cell of point `u` of the square; if `sampled`, to one in proportion to the masses and a point in it:
+    /// halves then end at their probability, not in the middle. One loop for both, since both are met by a warp.
+    AMBILUX_HD Cell descend(uint32_t leaf, Vec2f u, bool sampled) const {
+        Cell c = {0, 0, 0, 1.0f, {0.0f, 0.0f}};
+        float side = 1.0f;
+        for (uint32_t next = 0;;) {
+            const Node n = start_of<Node>(nodes[leaf * kNodes + next]);
+            const uint32_t x = pick_half(n.left, sampled, u.x, c.density);
+            const uint32_t y = pick_half(x ? n.lower_right : n.lower_left, sampled, u.y, c.density);
+            side *= 0.5f;
+            c = {next, x + 2 * y, c.level + 1, c.density, {c.at.x + float(x) * side, c.at.y + float(y) * side}};
+            next = child(n.children, c.quadrant);
+            if (next != 0) continue;
+            c.at = {c.at.x + side * u.x, c.at.y + side * u.y};
+            return c;
         }
     }
-    /// A point of the square, in proportion to the density, which is that of its cell.
-    AMBILUX_HD Vec2f sample(uint32_t leaf, Vec2f u, float& density) const {
-        Vec2f low = {0.0f, 0.0f};
-        float side = 1.0f;
-        density = 1.0f;
-        for (uint32_t node = 0;;) {
-            const uint32_t at = leaf * kNodes + node;
-            const Vec4f m = probabilities(at);
-            const float left = m.x + m.z, right = m.y + m.w;
-            const uint32_t x = pick_half(left / (left + right), u.x);
-            const uint32_t y = pick_half((x ? m.y : m.x) / (x ? right : left), u.y);
-            side *= 0.5f;
-            density *= 4.0f * of(m, x + 2 * y);
-            low = {low.x + float(x) * side, low.y + float(y) * side};
-            node = child(children[at], x + 2 * y);
-            if (node == 0) return {low.x + side * u.x, low.y + side * u.y};
-        }
+    AMBILUX_HD Cell cell(uint32_t leaf, Vec2f u) const { return descend(leaf, u, false); }
+
+private:
+    /// Which half `u` in [0,1) falls to, the first with probability `first`; `u` is uniform in that half after it.
+    AMBILUX_HD static uint32_t pick_half(float first, bool sampled, float& u, float& density) {
+        const float end = sampled ? first : 0.5f;
+        const bool second = !(u < end);
+        u = second ? (u - end) / (1.0f - end) : u / end;
+        u = clamp(u, 0.0f, kOneMinusEpsilon);
+        density *= 2.0f * (second ? 1.0f - first : first);
+        return second;
     }
 };
 
@@ -107,15 +107,15 @@ struct GuideTree {
     static constexpr uint32_t kLeafBit = 0x80000000u;
     static constexpr uint32_t kMostDepth = 36;
 
+    /// Cells of the cube, by x, y and z, from which descents begin: what kGridDepth halvings lead to.
+    static constexpr uint32_t kGridSide = 32, kGridDepth = 15, kGridCells = kGridSide * kGridSide * kGridSide;
+
     uint32_t* space;  ///< with kLeafBit a leaf, else the node of the lower half, which that of the upper one follows
+    uint32_t* grid;   ///< [cell]: as of space
     GuideLeaf* leaves;
     GuideQuads quads;
     Vec3f low;  ///< corner of the cube around the scene
     float inverse_side;
-
-    struct Place {
-        uint32_t leaf, depth;
-    };
 
     /// In the unit cube.
     AMBILUX_HD Vec3f unit(Vec3f p) const {
@@ -123,28 +123,26 @@ struct GuideTree {
         return {clamp(x.x, 0.0f, kOneMinusEpsilon), clamp(x.y, 0.0f, kOneMinusEpsilon),
                 clamp(x.z, 0.0f, kOneMinusEpsilon)};
     }
-    AMBILUX_HD Place find(Vec3f x) const {
-        uint32_t node = space[0], depth = 0;
-        for (; !(node & kLeafBit); ++depth) {
+    AMBILUX_HD uint32_t find(Vec3f x) const {
+        x = x * float(kGridSide);
+        const uint32_t i = uint32_t(x.x), j = uint32_t(x.y), k = uint32_t(x.z);
+        return descend(grid[(k * kGridSide + j) * kGridSide + i], {x.x - float(i), x.y - float(j), x.z - float(k)},
+                       ~0u) &
+               ~kLeafBit;
+    }
+    /// From an entry of `space` down to a leaf, at most so many levels, at a point of its unit cube.
+    AMBILUX_HD uint32_t descend(uint32_t node, Vec3f x, uint32_t levels) const {
+        for (; levels > 0 && !(node & kLeafBit); --levels) {
             const float twice = 2.0f * x.x;
             const uint32_t upper = twice >= 1.0f;
             x = {x.y, x.z, twice - float(upper)};
             node = space[node + upper];
         }
-        return {node & ~kLeafBit, depth};
+        return node;
     }
-    /// Sides of a cell of the unit cube.
-    AMBILUX_HD static Vec3f sides(uint32_t depth) {
-        return {GuideQuads::side((depth + 2) / 3), GuideQuads::side((depth + 1) / 3), GuideQuads::side(depth / 3)};
-    }
-    AMBILUX_HD uint32_t leaf(Vec3f p) const { return find(unit(p)).leaf; }
+    AMBILUX_HD uint32_t leaf(Vec3f p) const { return find(unit(p)); }
     AMBILUX_HD float pdf_sa(uint32_t leaf, Vec3f d) const {
         return kInv4Pi * quads.cell(leaf, square_of_direction(d)).density;
-    }
-    AMBILUX_HD Vec3f sample(uint32_t leaf, Vec2f u, float& pdf_sa) const {
-        const Vec2f at = quads.sample(leaf, u, pdf_sa);
-        pdf_sa *= kInv4Pi;
-        return square_to_sphere(at);
     }
 };
 

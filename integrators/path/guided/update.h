@@ -19,7 +19,7 @@ struct GuideStep {
     AMBILUX_HD GuideProgress& progress() const { return *state.progress; }
     /// Of a count and a sum that is not 0.
     AMBILUX_HD float mean_radiance(const int64_t* sum) const {
-        return float(sum[1]) / float(sum[0]) * progress().unit[uint32_t(GuideSum::radiance)];
+        return LearnRecords::kWeight * float(sum[1]) / float(sum[0]) * progress().unit[uint32_t(GuideSum::radiance)];
     }
     /// Samples of one tree are twice those of the one before: 1, 2, 4, ... iterations.
     AMBILUX_HD bool is_due() const {
@@ -98,10 +98,11 @@ private:
     /// Masses of the quadrants of all nodes go to state.old, and records of nodes to the quadrants that they are;
     /// returns the mass of all. `first`: the root.
     AMBILUX_HD float sum_up(uint32_t first, uint32_t count) const {
-        const GuideQuads &quads = tree().quads, &old = state.old;
+        const GuideQuads& quads = tree().quads;
+        const GuideMasses& old = state.old;
         set_start(old.masses[first], 0u);
         for (uint32_t n = first; n < first + count; ++n) {
-            const uint32_t children = old.children[n] = quads.children[n];
+            const uint32_t children = old.children[n] = start_of<GuideQuads::Node>(quads.nodes[n]).children;
             for (uint32_t q = 0; q < 4; ++q)
                 if (const uint32_t c = GuideQuads::child(children, q))
                     set_start(old.masses[first + c], start_of<uint32_t>(old.masses[n]) + 1);
@@ -112,7 +113,7 @@ private:
             const auto mass = [&](uint32_t q) {
                 const uint32_t c = GuideQuads::child(old.children[n], q);
                 if (c) state.found[4ull * n + q] = found_in(first + c);
-                return c ? sum_of(old.probabilities(first + c)) : cell_mass(float(state.sums[4ull * n + q]), level);
+                return c ? sum_of(old.of(first + c)) : cell_mass(float(state.sums[4ull * n + q]), level);
             };
             const Vec4f masses = {mass(0), mass(1), mass(2), mass(3)};
             set_start(old.masses[n], masses);
@@ -140,12 +141,11 @@ private:
         const GuideQuads& quads = tree().quads;
         const float least = total * (settings.target == GuideTarget::moment ? kLeastMoment : kLeastRadiance);
         uint32_t count = 1;
-        set_start(quads.masses[first], Begun{total, 0, 1, all_found});
+        set_start(quads.nodes[first], Begun{total, 0, 1, all_found});
         for (uint32_t n = 0; n < count; ++n) {
-            const Begun begun = start_of<Begun>(quads.masses[first + n]);
+            const Begun begun = start_of<Begun>(quads.nodes[first + n]);
             const float even = 0.25f * begun.mass;
-            const Vec4f mass =
-                begun.from ? state.old.probabilities(first + begun.from - 1) : Vec4f{even, even, even, even};
+            const Vec4f mass = begun.from ? state.old.of(first + begun.from - 1) : Vec4f{even, even, even, even};
             const uint32_t old_children = begun.from ? state.old.children[first + begun.from - 1] : 0;
             uint32_t children = 0;
             for (uint32_t q = 0; q < 4; ++q) {
@@ -156,11 +156,10 @@ private:
                     begun.level + 2 > GuideQuads::kLevels)
                     continue;
                 const uint32_t was = GuideQuads::child(old_children, q);
-                set_start(quads.masses[first + count], Begun{m, begun.level + 1, was ? was + 1 : 0, found});
+                set_start(quads.nodes[first + count], Begun{m, begun.level + 1, was ? was + 1 : 0, found});
                 children |= count++ << 8 * q;
             }
-            set_start(quads.masses[first + n], probabilities(mass, begun.found));
-            quads.children[first + n] = children;
+            set_start(quads.nodes[first + n], GuideQuads::node(probabilities(mass, begun.found), children));
         }
         return count;
     }
@@ -207,10 +206,19 @@ private:
     }
     AMBILUX_HD void copy_quads(uint32_t from, uint32_t to, uint32_t nodes) const {
         const GuideQuads& q = tree().quads;
-        for (uint32_t n = 0; n < nodes; ++n) {
-            q.masses[to * GuideQuads::kNodes + n] = q.masses[from * GuideQuads::kNodes + n];
-            q.children[to * GuideQuads::kNodes + n] = q.children[from * GuideQuads::kNodes + n];
-        }
+        for (uint32_t n = 0; n < nodes; ++n)
+            q.nodes[to * GuideQuads::kNodes + n] = q.nodes[from * GuideQuads::kNodes + n];
+    }
+};
+
+/// Where descents begin, of the new tree.
+struct FillGrid : GuideStep {
+    AMBILUX_HD void operator()(uint32_t cell) const {
+        if (!progress().updating) return;
+        constexpr uint32_t kSide = GuideTree::kGridSide;
+        const uint32_t i = cell % kSide, j = cell / kSide % kSide, k = cell / (kSide * kSide);
+        const auto middle = [](uint32_t c) { return (float(c) + 0.5f) / float(kSide); };
+        tree().grid[cell] = tree().descend(tree().space[0], {middle(i), middle(j), middle(k)}, GuideTree::kGridDepth);
     }
 };
 
@@ -259,10 +267,11 @@ struct GuideUpdate {
     RefineQuads refine;
     CountSplits count;
     SplitLeaves split;
+    FillGrid grid;
     UpdateTiles tiles;
     EndUpdate end;
 
-    static GuideUpdate of(const GuideStep& step) { return {{step}, {step}, {step}, {step}, {step}, {step}}; }
+    static GuideUpdate of(const GuideStep& step) { return {{step}, {step}, {step}, {step}, {step}, {step}, {step}}; }
     template <class Executor>
     void run(Executor& exec) const {
         const GuidedState& s = begin.state;
@@ -271,6 +280,7 @@ struct GuideUpdate {
         exec.for_each(count, s.most_leaves);
         exec.scan(s.scan, s.splits, s.places, s.most_leaves, begin.record);
         exec.for_each(split, s.most_leaves);
+        exec.for_each(grid, GuideTree::kGridCells);
         exec.for_each(tiles, s.tile_count);
         exec.for_each(end, 1);
     }
