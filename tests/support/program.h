@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <csignal>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -38,6 +39,7 @@ inline pid_t start_program(const TempFolder& folder, const std::string& program,
         const std::string out = output.empty() ? folder / ".out" : output;
         if (!std::freopen(out.c_str(), "w", stdout) || !std::freopen((folder / ".err").c_str(), "w", stderr))
             ::_exit(99);
+        for (const int number : {SIGHUP, SIGINT, SIGTERM}) ::signal(number, SIG_DFL);  // nohup and shells ignore some
         if (before) before();
         ::execvp(program.c_str(), argv.data());
         ::_exit(98);
