@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/ranks.h"
 #include "experiments/batches.h"
+#include "experiments/peers/peer.h"
 #include "film/png_io.h"
 #include "session/load.h"
 #include "session/machine.h"
@@ -19,6 +20,16 @@
 namespace ambilux {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Batches are told as independent of each other.
+bool has_batches(const RenderTask& task) {
+    const PeerKind* const peer = find_peer_kind(task.run.renderer);
+    return peer ? peer->independent_passes : task.settings.sampler == Sampler::independent;
+}
+
+}  // namespace
 
 Work work_after(const ExperimentConfig& config, const LoadedEntry& scene, const RenderPosition& p) {
     const double samples = config.spp.empty() ? 0 : double(config.spp.back()) - double(p.samples),
@@ -156,8 +167,7 @@ bool TaskRunner::pass_checkpoints(RenderTask& task, Renderer& renderer) {
         // in the same order as an uninterrupted one.
         if (position.samples > before.samples) {
             const FilmMoments film = renderer.film();
-            // Batches are told as independent of each other.
-            if (!position.interrupted && task.settings.sampler == Sampler::independent)
+            if (!position.interrupted && has_batches(task))
                 record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
             state.moments.add(film);
             state.devices = save_devices(renderer);

@@ -8,78 +8,15 @@
 
 #include "core/distributions.h"
 #include "core/error.h"
+#include "film/block_sums.h"
 
 namespace ambilux {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-/// One image in one block and channel.
-struct Side {
-    double mean = 0;       ///< sum of the pixels' means
-    double variance = 0;   ///< sum of their variances
-    double dof_terms = 0;  ///< sum of v²/(n-1), for Welch-Satterthwaite
-    double max_abs = 0;    ///< sum of absolute means
-    double events = kInf;  ///< number of random events that made the variance; see measure()
-};
-
-struct Rectangle {
-    uint32_t x, y, width, height;
-};
-
-/// The variance of a block whose pixels are not independent, from the sums of its batches. Events that several pixels
-/// share are one.
-void correlate(const Estimate& image, const Rectangle& r, uint32_t channel, Side& side) {
-    const double n = double(image.batches.size());
-    double squares = 0;
-    for (const std::vector<double>& batch : image.batches) {
-        double sum = 0;
-        for (uint32_t y = r.y; y < r.y + r.height; ++y)
-            for (uint32_t x = r.x; x < r.x + r.width; ++x) sum += batch[(size_t(y) * image.width + x) * 3 + channel];
-        squares += (sum - side.mean) * (sum - side.mean);
-    }
-    const double variance = squares / (n * (n - 1));
-    if (variance > side.variance) side.events *= side.variance / variance;
-    side.variance = variance;
-    side.dof_terms = variance * variance / (n - 1);
-}
-
-/// Sums over a block, and how many events its variance comes from. A pixel of n samples with mean m and sample variance
-/// s² above a base b, which no event made bright, has e = n(m-b)²/(s²+(m-b)²) effective ones (Kish 1965): rare equal
-/// hits count one each. The base is the darkest mean in the block. Pixels add up weighted by their share of the
-/// variance, so that N rare hits anywhere give N.
-Side measure(const Estimate& image, const Rectangle& r, uint32_t channel) {
-    Side side;
-    double base = kInf;
-    const auto index = [&](uint32_t x, uint32_t y) { return (size_t(y) * image.width + x) * 3 + channel; };
-    for (uint32_t y = r.y; y < r.y + r.height; ++y)
-        for (uint32_t x = r.x; x < r.x + r.width; ++x) {
-            const double m = image.mean[index(x, y)];
-            side.mean += m;
-            side.max_abs += std::abs(m);
-            base = std::min(base, m);
-        }
-    if (image.samples == 0) return side;
-    const double n = double(image.samples);
-    double concentration = 0;
-    for (uint32_t y = r.y; y < r.y + r.height; ++y)
-        for (uint32_t x = r.x; x < r.x + r.width; ++x) {
-            const size_t i = index(x, y);
-            const double v = image.variance_of_mean[i], above = image.mean[i] - base;
-            if (v == 0) continue;
-            side.variance += v;
-            side.dof_terms += v * v / (n - 1);
-            const double events = n * above * above / (v * n + above * above);
-            concentration += v * v / std::max(1.0, events);  // no variance without at least one event
-        }
-    if (side.variance > 0) side.events = side.variance * side.variance / concentration;
-    if (side.max_abs == 0) side.events = 0;  // black: it may have met no light yet
-    if (!image.batches.empty()) correlate(image, r, channel, side);
-    return side;
-}
-
 /// Normal equivalent of the difference of a block's means.
-double block_z(const Side& a, const Side& b, const ZTestOptions& options) {
+double block_z(const BlockSum& a, const BlockSum& b, const ZTestOptions& options) {
     const double difference = a.mean - b.mean, variance = a.variance + b.variance;
     if (!std::isfinite(difference) || !std::isfinite(variance)) return kInf;
     const double rounding = options.rounding * std::max(a.max_abs, b.max_abs);
@@ -87,7 +24,7 @@ double block_z(const Side& a, const Side& b, const ZTestOptions& options) {
     if (variance == 0) return std::copysign(kInf, difference);
     double t = std::abs(difference) / std::sqrt(variance + rounding * rounding);
     // Hall's transformation, for the skewness of the darker side, weighted by its share of the variance.
-    const Side& dark = difference < 0 ? a : b;
+    const BlockSum& dark = difference < 0 ? a : b;
     if (dark.variance > 0) {
         const double g = std::pow(dark.variance / variance, 1.5) / std::sqrt(dark.events);
         t = std::max(0.0, std::min(t, t - g * t * t / 3 + g * g * t * t * t / 27 - g / 6));
@@ -150,7 +87,7 @@ private:
     struct Block {
         Rectangle area;
         uint32_t channel;
-        Side a, b;
+        BlockSum a, b;
         double z;
         double pixels() const { return double(uint64_t(area.width) * area.height); }
         double fewest_events() const { return std::min(a.events, b.events); }
@@ -194,8 +131,8 @@ private:
         Rectangle& area = block.area;
         area.width = uint32_t(std::min<uint64_t>(level.size, a_.width - area.x));
         area.height = uint32_t(std::min<uint64_t>(level.size, a_.height - area.y));
-        block.a = measure(a_, area, channel);
-        block.b = measure(b_, area, channel);
+        block.a = block_sum(a_, area, channel);
+        block.b = block_sum(b_, area, channel);
         block.z = block_z(block.a, block.b, options_);
         return block;
     }

@@ -71,7 +71,7 @@ struct ZTestResult {
 ///
 /// Heavy tails: a block that has met few of its rare bright samples is too dark and its variance is estimated too small
 /// together, so that plain z-scores fail for correct images. Two guards. The number of events that made a block's
-/// variance is estimated (see measure() in the source; N rare equal hits give N); a block is tested only if it has met
+/// variance is estimated (see block_sum(); N rare equal hits give N); a block is tested only if it has met
 /// `min_events` on both sides and its share of the events in the block of twice its size is half as many. Larger blocks
 /// reach that, so missing light cannot hide on every scale. And the skewness 1/sqrt(events) is taken out of t (Hall
 /// 1992, "On the removal of skewness by transformation") where that makes |t| smaller. What neither guard can see is a

@@ -51,7 +51,9 @@ Agreement measure_agreement(PeerRenderer& peer, uint64_t samples, const Referenc
     a.samples = position.samples;
     a.seconds = position.seconds;
     a.parts = sum_of(parts);
-    a.test = z_test(to_estimate(parts), to_estimate(reference));
+    const Estimate own = to_estimate(parts), known = to_estimate(reference);
+    a.test = z_test(own, known);
+    a.near = equivalence(own, known);
     return a;
 }
 
@@ -72,6 +74,10 @@ nlohmann::json to_json(const Agreement& a) {
     const ZTestResult& t = a.test;
     return {{"pass", t.pass},
             {"undecided", t.undecided},
+            {"equivalent", a.near.shown},
+            {"level", a.near.level},
+            {"mean_bound", finite(a.near.mean_bound)},
+            {"block_bound", finite(a.near.block_bound)},
             {"samples", a.samples},
             {"seconds", a.seconds},
             {"with_own_path", a.with_own_path},

@@ -23,7 +23,7 @@ const std::vector<PeerKind>& peer_kinds() {
          false,
          true,
          start_python_peer},
-        {"luxcore", {"PATHCPU", "BIDIRCPU", "PATHOCL"}, {}, {}, {}, nullptr, false, true, start_python_peer},
+        {"luxcore", {"PATHCPU", "BIDIRCPU", "PATHOCL"}, {}, {}, {}, nullptr, false, true, start_python_peer, false},
         {"build", {}, {}, {"module"}, {}, nullptr, true, true, start_python_peer},
         {"command", {}, {}, {"command"}, {}, check_command, false, true, start_command_peer},
         {"images", {}, {}, {"files"}, {"samples", "seconds"}, check_images, false, false, start_image_peer},

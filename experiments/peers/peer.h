@@ -56,6 +56,7 @@ struct PeerKind {
     bool own_settings;  ///< takes integrator, variant, estimator and any `set`, and checks them itself
     bool tested;        ///< that its agreement is measured: it can render as many samples as that needs
     std::unique_ptr<PeerRenderer> (*start)(const PeerJob&);  ///< throws PeerRefusal, Error(interrupted)
+    bool independent_passes = true;  ///< of each other: false of one low-discrepancy sequence, which has no batches
 };
 
 /// Empty if there is none of that key.

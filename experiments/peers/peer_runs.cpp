@@ -112,12 +112,12 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     entry["state"] = "untested";
     if (!find_peer_kind(render.run.renderer)->tested) return entry;
     Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, request_.interrupt);
-    if (!agreement.interrupted && !agreement.test.pass) {
+    if (!agreement.interrupted && !agreement.agrees()) {
         // Few samples of a heavy tail look like another image, or like nothing. More of them, drawn anew, decide.
         peer->set_seed(kAgreementSeed - 1);
         agreement = measure_agreement(*peer, 4 * config_.agreement_spp, reference, request_.interrupt);
     }
-    if (!agreement.interrupted && !agreement.test.pass && is_path_tracer(render.run)) {
+    if (!agreement.interrupted && !agreement.agrees() && is_path_tracer(render.run)) {
         RenderSettings settings = render.settings;
         settings.integrator = RenderSettings().integrator;
         settings.variant = RenderSettings().variant;
@@ -131,7 +131,7 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     write_png(request_.output + "/" + image + ".png", mean_image(agreement.parts));
     entry["agreement"] = ambilux::to_json(agreement);
     entry["image"] = image + ".exr";
-    entry["state"] = agreement.test.pass ? "agrees" : agreement.test.undecided ? "undecided" : "differs";
+    entry["state"] = agreement.agrees() ? "agrees" : agreement.test.undecided ? "undecided" : "differs";
     return entry;
 }
 

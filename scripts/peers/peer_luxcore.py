@@ -39,7 +39,7 @@ def settings_of(job):
     width, height = job["film"]
     if job["crop"] != [0, 0, width, height]:
         raise Refused("a crop of the film")
-    return {"renderengine.type": job["integrator"], "sampler.type": "RANDOM", "sampler.random.adaptive.strength": 0.0,
+    return {"renderengine.type": job["integrator"], "sampler.type": "SOBOL", "sampler.sobol.adaptive.strength": 0.0,
             "film.width": width, "film.height": height, "film.filter.type": "NONE", "film.outputs.0.type": "RGB", "film.outputs.0.filename": "none.exr",
             "film.imagepipelines.0.0.type": "NOP", "path.clamping.variance.maxvalue": 0.0, "path.forceblackbackground.enable": False,
             "path.pathdepth.total": depth, "path.pathdepth.diffuse": depth, "path.pathdepth.glossy": depth, "path.pathdepth.specular": depth,
@@ -198,6 +198,7 @@ def start(job, build=True):
         return (pass_of_kernels if sums else pass_of_threads)(session, seed, samples)
 
     differences = ["passes end when enough samples are counted: some have more than asked for, which is counted",
+                   "sampler: LuxCore's Sobol' sequence, whose passes are not independent: there are no batches, and intervals are over seeds",
                    "roulette: LuxCore's own, from the same depth, with a survival of at least 0.5"]
     if sums:
         differences.append("passes are differences of the film's sums, between two films that the device hands over; what it makes between passes is not counted")

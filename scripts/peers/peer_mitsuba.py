@@ -21,6 +21,7 @@ def parts(samples, scalar):
 
 
 def start(job):
+    tree, changes = mitsuba_scene.convert(job)  # what it refuses needs no Mitsuba
     try:
         import mitsuba as mi
     except ImportError as error:
@@ -34,7 +35,6 @@ def start(job):
     except ImportError as error:
         raise Missing(f"variant {variant}: {error}") from error
     mi.set_log_level(mi.LogLevel.Error)
-    tree, changes = mitsuba_scene.convert(job)
     path = os.path.join(job["folder"], "scene.xml")
     tree.write(path, encoding="utf-8", xml_declaration=True)
     scene = mi.load_file(path)

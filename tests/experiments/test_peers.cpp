@@ -81,6 +81,8 @@ TEST_CASE("a peer that agrees is timed, one that does not is reported and not ti
     const json same = entry_of(output, "same"), shallow = entry_of(output, "shallow"), none = entry_of(output, "none");
     CHECK(same["state"] == "agrees");
     CHECK(same["agreement"]["samples"] == 256);
+    CHECK(same["agreement"]["equivalent"] == false);  // so few samples find no difference, and show nothing
+    CHECK(same["agreement"]["mean_bound"].get<double>() > 1e-3);
     CHECK(std::abs(same["agreement"]["relative_difference"].get<double>()) < 0.1);
     CHECK(shallow["state"] == "differs");
     CHECK(shallow["agreement"]["samples"] == 1024);  // four times as many decide

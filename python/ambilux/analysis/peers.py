@@ -7,7 +7,8 @@ from ambilux.analysis.experiment import InputError, read_json
 TIMED = ("agrees", "untested")
 STATES = {"agrees": "agrees", "untested": "not tested", "differs": "differs: not timed", "undecided": "undecided: not timed", "missing": "not installed", "refused": "refused"}
 NOTE = ("Agreement: block means of the renderer's image against those of the reference, on all scales, with thresholds from the variances of both (film/ztest.h); "
-        "p is the chance that images of equal expectation differ as much. Only what agrees is timed. Detectable: the relative difference of the means that would just have failed. "
+        "p is the chance that images of equal expectation differ as much. Equivalent: shown at the stated level to differ by less than 0.1 % in the mean and 1 % in every block "
+        "(film/equivalence.h), whatever p is. Only what is equivalent, or where no difference was found, is timed. Bounds: what mean and worst block differ by at most, at that level. "
         "Times to load and to compile are in no render's time.")
 
 
@@ -25,6 +26,18 @@ def entries(experiment):
 
 def is_left_out(experiment, scene, run):
     return any(e["scene"] == scene and e["run"] == run and e["state"] not in TIMED for e in entries(experiment))
+
+
+def verdict(entry):
+    """Of STATES; of what agrees, whether that was shown, or no difference was found."""
+    a = entry.get("agreement") or {}
+    if entry["state"] != "agrees" or "equivalent" not in a:
+        return STATES[entry["state"]] + (" with our path tracer" if a.get("with_own_path") else "")
+    return f"equivalent (level {a.get('level', 0):g})" if a["equivalent"] else "no difference found" + (" to our path tracer" if a.get("with_own_path") else "")
+
+
+def percent(value):
+    return "" if value is None else f"{100 * value:.2g} %"
 
 
 def difference(entry):
@@ -73,10 +86,10 @@ def to_html(experiment):
     rows = []
     for e in entries(experiment):
         a = e.get("agreement") or {}
-        detectable, p = a.get("detectable"), a.get("p")
-        cells = [e["scene"], e["run"], e.get("version") or e["renderer"], STATES[e["state"]] + (" with our path tracer" if a.get("with_own_path") else ""), difference(e), "" if p is None else f"{p:.2g}",
-                 "" if detectable is None else f"{100 * detectable:.2g} %", str(a.get("samples", "")), seconds(e.get("load_seconds")), seconds(e.get("compile_seconds")),
+        p, bounds = a.get("p"), " and ".join(filter(None, (percent(a.get("mean_bound")), percent(a.get("block_bound")))))
+        cells = [e["scene"], e["run"], e.get("version") or e["renderer"], verdict(e), difference(e), "" if p is None else f"{p:.2g}",
+                 bounds or percent(a.get("detectable")), str(a.get("samples", "")), seconds(e.get("load_seconds")), seconds(e.get("compile_seconds")),
                  "; ".join(e.get("changes") or ()), e.get("reason") or "; ".join(e.get("differences") or ())]
         rows.append("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>")
-    heads = ("scene", "run", "renderer", "state", "difference", "p", "detectable", "spp", "load s", "compile s", "scene changed for it", "differs in, or reason")
+    heads = ("scene", "run", "renderer", "state", "difference", "p", "bounds of mean and block", "spp", "load s", "compile s", "scene changed for it", "differs in, or reason")
     return ('<table class="said"><thead><tr>' + "".join(f"<th>{h}</th>" for h in heads) + "</tr></thead><tbody>" + "".join(rows) + "</tbody></table>")

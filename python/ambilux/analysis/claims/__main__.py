@@ -33,12 +33,13 @@ def write_page(claims, out, page, images):
     from ambilux.analysis.claims import page as pages
 
     outcomes = [evaluate.outcome(claim, out) for claim in claims]
-    write(page, pages.markdown(outcomes, images, page.parent))
+    page.parent.mkdir(parents=True, exist_ok=True)
+    write(page, pages.markdown(claims, {o.claim.name: pages.stored(o, images) for o in outcomes}, images, page.parent))
     for o in outcomes:
         left_out = f"; left out: {', '.join(o.left_out)}" if o.left_out else ""
         print(f"{o.claim.name}: {o.verdict}: {o.why}{left_out}")
     small = any(o.found and not o.evidence for o in outcomes)
-    print(evaluate.counted(outcomes) + ("; by small runs, which are no evidence" if small else ""))
+    print(evaluate.counted([o.verdict for o in outcomes]) + ("; by small runs, which are no evidence" if small else ""))
     return 0
 
 
@@ -50,12 +51,11 @@ def main(arguments=None):
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these claims alone")
     parser.add_argument("--quick", action="store_true", help="experiments --reduced, into out/claims-quick")
     parser.add_argument("-o", "--output", type=Path, help="folder of the results (default: out/claims)")
-    parser.add_argument("--page", type=Path, help="default: docs/claims.md, with --quick or --claims OUTPUT/claims.md")
+    parser.add_argument("--page", type=Path, help="default: OUTPUT/claims.md; docs/claims.md is made by scripts/evidence.sh")
     parser.add_argument("--program", default=os.environ.get("AMBILUX", "build/cli/ambilux"), help="default: $AMBILUX")
     o = parser.parse_args(arguments)
     out = o.output or Path("out/claims-quick" if o.quick else "out/claims")
-    own = o.quick or o.claims != parser.get_default("claims") or o.only
-    page = o.page or (out / "claims.md" if own else Path("docs/claims.md"))
+    page = o.page or out / "claims.md"
     images = page.parent / "images" / "claims"
     try:
         claims = registry.load(o.claims, o.only)

@@ -156,7 +156,6 @@ def outcome(claim, out):
     return Outcome(claim, status, found, *verdict(found), left_out, data, benches)
 
 
-def counted(outcomes):
-    """"14 claims: 3 reproduced, 2 in part, 1 not, 4 undecided, 4 not run"."""
-    every = [o.verdict for o in outcomes]
+def counted(every):
+    """"14 claims: 3 reproduced, 2 in part, 1 not, 4 undecided, 4 not run", of their verdicts."""
     return f"{len(every)} claims: " + ", ".join(f"{every.count(v)} {v}" for v in (*SAYS, "not run"))

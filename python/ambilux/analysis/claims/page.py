@@ -7,11 +7,12 @@ import matplotlib.pyplot as plt
 
 from ambilux.analysis import captions, comparison, style, tables
 from ambilux.analysis.claims import evaluate
+from ambilux.analysis.evidence import data
 
 HEAD = """# Published claims
 
-What papers say, beside what this program measures. Written by `scripts/claims.sh` from the files in {folder} and from
-results; do not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
+What papers say, beside what this program measures. Written by a script from the files in {folder} and from results; do
+not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
 
 A ratio says how many times as good the first run of a comparison is as the second: *at equal time* error times time of
 the second over that of the first, *at equal samples* error of the second over that of the first, *of rates* rate of the
@@ -36,10 +37,6 @@ def verdict_text(outcome):
     return "not run on a device" + (f"; a small run says: {outcome.verdict}" if outcome.found else "")
 
 
-def ratio_text(j):
-    return "–" if j is None else tables.interval(j) + (f" ({j.doubt})" if j.doubt else "")
-
-
 def published_text(compare):
     if compare.published is None:
         return f"above {compare.above:g}"
@@ -47,17 +44,20 @@ def published_text(compare):
     return tables.number(low) if low == high else f"{tables.number(low)} to {tables.number(high)}"
 
 
+def ratio_cell(j):
+    return None if j is None else data.judged(j, mark=f" ({j.doubt})" if j.doubt else "")
+
+
 def table(outcome):
-    """The comparisons, the measure that decides first."""
+    """The comparisons, the measure that decides first: columns and rows of cells."""
     known = {m for f in outcome.found for m in f.measures}
     measures = sorted(known, key=lambda m: (m != outcome.claim.measure, m))
-    yield "| " + " | ".join(["scene", "comparison", "published", *(SHOWN[m] for m in measures), "says"]) + " |"
-    yield "|" + " --- |" * (4 + len(measures))
+    rows = []
     for f in outcome.found:
         c = f.compare
-        own = [tables.minus(ratio_text(f.measures.get(m))) for m in measures]
         scene = f"{c.scene}, {c.batch}" if c.batch else c.scene
-        yield "| " + " | ".join([scene, f"{c.run} over {c.over}", published_text(c), *own, f.says]) + " |"
+        rows.append([scene, f"{c.run} over {c.over}", published_text(c), *(ratio_cell(f.measures.get(m)) for m in measures), f.says])
+    return ["scene", "comparison", "published", *(SHOWN[m] for m in measures), "says"], rows
 
 
 def facts(outcome):
@@ -94,36 +94,41 @@ def picture(outcome, folder):
     return f"{claim.name}.png"
 
 
-def section(outcome, images, root):
-    claim = outcome.claim
+def stored(outcome, images):
+    """What the page needs of an outcome, as evidence/data.py keeps it; draws its picture into the folder `images`."""
+    columns, rows = table(outcome)
+    return {"says": outcome.verdict, "verdict": verdict_text(outcome), "why": outcome.why, "full": outcome.evidence, "columns": columns,
+            "rows": rows, "left_out": list(outcome.left_out), "picture": picture(outcome, images) or "", "facts": list(facts(outcome))}
+
+
+def section(claim, found, images):
     link = f", [doi:{claim.doi}](https://doi.org/{claim.doi})" if claim.doi else ""
     yield from [f"## {claim.title}", "", f"{claim.paper}{link}.", ""]
     error = ", of RMSE" if claim.error == "rmse" else ""
     yield from [f"Claim ({claim.where}): *{claim.states}* Kind: {claim.kind}{error}.", ""]
-    yield from [f"Verdict: {verdict_text(outcome)} ({outcome.why}).", ""]
-    if outcome.found:
-        yield from [*table(outcome), ""]
-    if outcome.left_out:
-        yield from [f"Left out, since they are not there: {', '.join(outcome.left_out)}.", ""]
-    if name := picture(outcome, images):
-        yield from [f"![{claim.title}: {claim.picture}]({os.path.relpath(images, root)}/{name})", ""]
+    yield from [f"Verdict: {found['verdict']} ({found['why']}).", ""]
+    if found["rows"]:
+        yield from [*data.block_lines(found), ""]
+    if found["left_out"]:
+        yield from [f"Left out, since they are not there: {', '.join(found['left_out'])}.", ""]
+    if found["picture"]:
+        yield from [f"![{claim.title}: {claim.picture}]({images}/{found['picture']})", ""]
     yield from ["What differs from the paper:", "", *(f"- {d}" for d in claim.differs), ""]
-    was = "was" if outcome.found else "is"
-    yield from [f"How it {was} run:", "", *(f"- {f}" for f in facts(outcome)), ""]
+    yield from [f"How it {'was' if found['rows'] else 'is'} run:", "", *(f"- {f}" for f in found["facts"]), ""]
 
 
-def markdown(outcomes, images, root):
-    """The page, for a file in the folder `root`; pictures go to the folder `images`."""
-    folder = os.path.relpath(outcomes[0].claim.file.parent, root)
-    full = [o for o in outcomes if o.evidence]
+def markdown(claims, blocks, images, root, told=()):
+    """The page, for a file in the folder `root`; pictures are in the folder `images`. blocks: {claim: stored()}. told: lines on where it was run."""
+    folder, where = (os.path.relpath(path, root) for path in (claims[0].file.parent, images))
+    full = [blocks[c.name]["says"] for c in claims if blocks[c.name]["full"]]
     counts = f" Of these {evaluate.counted(full)}." if full else ""
     docs = os.path.normpath(os.path.relpath("docs", root) + "/x")[:-1]
     lines = [HEAD.format(folder=f"[{os.path.basename(folder)}]({folder})", docs=docs),
-             f"{len(outcomes)} claims, {len(full)} run at full size.{counts}", "",
+             f"{len(claims)} claims, {len(full)} run at full size.{counts}", *told, "",
              "| claim | paper | kind | verdict |", "| --- | --- | --- | --- |"]
-    for o in outcomes:
-        anchor = re.sub(r"[^\w -]", "", o.claim.title.lower()).replace(" ", "-")
-        year = re.search(r"\b(?:19|20)\d\d\b", o.claim.paper)
-        authors = o.claim.paper[:year.end()] if year else o.claim.paper
-        lines.append(f"| [{o.claim.title}](#{anchor}) | {authors} | {o.claim.kind} | {verdict_text(o)} |")
-    return "\n".join([*lines, "", *(line for o in outcomes for line in section(o, images, root))]).rstrip("\n") + "\n"
+    for claim in claims:
+        anchor = re.sub(r"[^\w -]", "", claim.title.lower()).replace(" ", "-")
+        year = re.search(r"\b(?:19|20)\d\d\b", claim.paper)
+        authors = claim.paper[:year.end()] if year else claim.paper
+        lines.append(f"| [{claim.title}](#{anchor}) | {authors} | {claim.kind} | {blocks[claim.name]['verdict']} |")
+    return "\n".join([*lines, "", *(text for c in claims for text in section(c, blocks[c.name], where))]).rstrip("\n") + "\n"

@@ -50,6 +50,10 @@ def outcome_of(tmp_path, a=(0.5, 1.0), kind="ranking at equal time", more="", er
     return evaluate.outcome(claim, out)
 
 
+def page_of(outcome, images, root):
+    return page.markdown([outcome.claim], {outcome.claim.name: page.stored(outcome, images)}, images, root)
+
+
 def test_the_projects_claims_are_complete():
     claims = registry.load(PROJECT)
     assert len(claims) >= 12 and len({c.title for c in claims}) == len(claims)
@@ -131,7 +135,7 @@ def test_what_did_not_run_is_not_left_out(tmp_path):
     assert "failed: no memory" in outcome_of(tmp_path, state="failed", message="no memory").why
     (claim,) = registry.load(write_claim(tmp_path / "claims"))
     assert evaluate.outcome(claim, tmp_path / "nothing").why == "nothing was run yet"
-    said = evaluate.counted([o, outcome_of(tmp_path)])
+    said = evaluate.counted([o.verdict, outcome_of(tmp_path).verdict])
     assert said == "2 claims: 1 reproduced, 0 in part, 0 not, 0 undecided, 1 not run"
 
 
@@ -159,7 +163,7 @@ b = { arguments = ["--backend", "x"], kernel = "slow" }
     run.status_file(out, claim).write_text(json.dumps(STATUS))
     o = evaluate.outcome(claim, out)
     assert o.verdict == "reproduced" and o.found[0].measures["of rates"].value == pytest.approx(2.01, rel=0.01)
-    text = page.markdown([o], out / "images", out)
+    text = page_of(o, out / "images", out)
     assert "Device: a card; medians of 25 launches, 3 turns" in text
     assert "| box, bounce 1 | a over b | 1.90 to 2.10 | 2.01" in text
     assert run.commands(claim, place)[0].startswith("ambilux bench rays ")
@@ -167,14 +171,14 @@ b = { arguments = ["--backend", "x"], kernel = "slow" }
 
 def test_the_page_says_what_is_evidence(tmp_path):
     more = '[[compare]]\nscene = "away"\nrun = "a"\nover = "b"\n'
-    text = page.markdown([outcome_of(tmp_path, more=more)], tmp_path / "images" / "claims", tmp_path)
+    text = page_of(outcome_of(tmp_path, more=more), tmp_path / "images" / "claims", tmp_path)
     for part in ("| [A over b](#a-over-b) | Somebody 2020 | ranking at equal time | **reproduced** |", "doi:10.1000/1",
                  "Claim (table 1): *A is better.*", "Verdict: **reproduced** (", "not there: away.", "- Seeds: 1–3",
                  "![A over b: box](images/claims/c.png)", "- Revision: ambilux 0.1.0, git 0123456", "- The scene.",
                  "- Command: `ambilux experiment c.toml`"):
         assert part in text, part
     assert (tmp_path / "images" / "claims" / "c.png").stat().st_size > 1000
-    small = page.markdown([outcome_of(tmp_path, small=True)], tmp_path / "none", tmp_path)
+    small = page_of(outcome_of(tmp_path, small=True), tmp_path / "none", tmp_path)
     assert "not run on a device; a small run says: reproduced" in small
     assert "Verdict: **" not in small and not (tmp_path / "none").exists()
 

@@ -86,6 +86,31 @@ def test_what_cannot_be_divided_is_an_error(tmp_path):
         convert(tmp_path, text)
 
 
+def test_colours_of_foreign_scenes_are_linear_rgb(tmp_path):
+    text = ('<scene version="0.6.0"><sensor type="perspective"/><bsdf type="diffuse" id="a"><srgb name="reflectance" value="#ff8000"/></bsdf>'
+            '<bsdf type="diffuse" id="b"><spectrum name="reflectance" value="0.5"/></bsdf><bsdf type="diffuse" id="c"><srgb name="reflectance" value="0.5"/></bsdf>'
+            '<emitter type="constant" id="d"><spectrum name="radiance" value="400:1, 700:2"/></emitter></scene>')
+    root, changes = convert(tmp_path, text)
+    found = {i: root.find(f"*[@id='{i}']")[0] for i in "abcd"}
+    assert [found[i].tag for i in "abcd"] == ["rgb", "rgb", "rgb", "spectrum"]
+    assert [float(v) for v in found["a"].get("value").split(",")] == pytest.approx([1, 0.215861, 0], abs=1e-6)
+    assert found["b"].get("value") == "0.5, 0.5, 0.5" and found["c"].get("value").startswith("0.21404")
+    assert "srgb is linear rgb (2 times)" in changes and "a spectrum of one or three numbers is rgb" in changes
+    newer, _ = convert(tmp_path, text.replace("0.6.0", "3.0.0"))
+    assert newer.find("bsdf[@id='b']")[0].tag == "spectrum"  # the same at all wavelengths, which Mitsuba 3 knows
+
+
+@pytest.mark.parametrize(("part", "reason"), [
+    ('<bsdf type="ward"/>', "bsdf ward: Mitsuba 3 has none"), ('<bsdf type="twosided"><bsdf type="phong"/></bsdf>', "bsdf phong"),
+    ('<bsdf type="roughconductor"><string name="distribution" value="phong"/></bsdf>', "distribution phong of roughconductor"),
+    ('<bsdf type="diffuse"><srgb name="reflectance" value="1, 2"/></bsdf>', "no colour")])
+def test_what_mitsuba_3_lacks_is_refused_by_name_before_it_is_started(tmp_path, monkeypatch, part, reason):
+    import peer_mitsuba
+    monkeypatch.setitem(sys.modules, "mitsuba", None)  # an import would fail
+    with pytest.raises(Refused, match=reason):
+        peer_mitsuba.start(job(tmp_path, f'<scene version="3.0.0"><sensor type="perspective"/>{part}</scene>', variant="scalar_rgb", folder=str(tmp_path)))
+
+
 def lux(tmp_path, shapes, sensor='<sensor type="perspective"><float name="fov" value="90"/></sensor>', size=(64, 32)):
     root, _ = convert(tmp_path, f'<scene version="3.0.0">{sensor}{shapes}</scene>')
     changes = mitsuba_scene.Changes()

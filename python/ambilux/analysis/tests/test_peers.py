@@ -35,6 +35,14 @@ def test_the_table_states_agreement_changes_and_times(tmp_path):
         assert text in table
 
 
+def test_what_agrees_says_whether_it_was_shown(tmp_path):
+    shown = {**AGREES["agreement"], "pass": False, "equivalent": True, "level": 0.05, "mean_bound": 0.0004, "block_bound": 0.0051}
+    table = peers.to_html(load(tmp_path, [{**AGREES, "agreement": shown}]))
+    assert "equivalent (level 0.05)" in table and "0.04 % and 0.51 %" in table
+    noisy = {**AGREES, "agreement": {**shown, "pass": True, "equivalent": False, "mean_bound": 0.32, "with_own_path": True}}
+    assert peers.verdict(noisy) == "no difference found to our path tracer"
+
+
 def test_a_folder_without_other_renderers_says_nothing(tmp_path):
     data = experiment.load(synthetic.make(tmp_path / "run", scenes=("box",)))
     assert peers.entries(data) == [] and list(peers.remarks(data)) == []
