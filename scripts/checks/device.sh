@@ -47,7 +47,7 @@ for method in "${methods[@]}"; do
     mv -f "$logs/image.exr" "$logs/code.exr" 2>/dev/null
     CUDA_FORCE_PTX_JIT=1 run "ptx_$name" 300 "${render[@]}" "${words[@]}"
     # Threads add up in any order, and may draw other light vertices of a cache.
-    "$build/cli/ambilux" compare "$logs/image.exr" "$logs/code.exr" | sed -n "s/^ *rmse/  to the image of machine code: rmse/p"
+    "$build/cli/ambilux" compare "$logs/image.exr" "$logs/code.exr" | sed -n "s/^RMSE */  RMSE to the image of machine code: /p"
   fi
 done
 exit "$failed"
