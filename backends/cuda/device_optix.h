@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "backends/handed_rays.h"
+#include "backends/optix.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -29,16 +30,12 @@ public:
     /// Whether launches can be part of a graph, inside of a conditional node. Asks by a small one, and logs why not.
     bool can_be_captured(cudaStream_t stream) const;
 
-    /// On the device: the structure, and what launches take for stacks.
-    uint64_t bytes() const;
-    /// Of the structure while it is built: the most, and what was predicted before anything was allocated.
-    uint64_t peak_bytes() const;
-    uint64_t predicted_peak_bytes() const;
-    double build_seconds() const;
+    const OptixFacts& facts() const { return facts_; }
 
 private:
     struct Parts;
     std::unique_ptr<Parts> parts_;
+    OptixFacts facts_;
 };
 
 }  // namespace ambilux

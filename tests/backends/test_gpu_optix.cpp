@@ -171,9 +171,8 @@ TEST_CASE("OptiX meets what our own traversal meets: rays of paths through scene
 TEST_CASE("What OptiX takes of a device is what is said") {
     if (!optix()) return;
     const Scene scene = triangle_soup(1000000, 0.02f, 1.0f, 12);
-    const OptixAnswers answers = trace_by_optix(scene, test_rays(scene, 1 << 20, 1.0f, 3), false);
-    CHECK(answers.peak_bytes <= answers.predicted_peak_bytes);
-    WARN("structure and stacks: " << answers.bytes << " bytes are counted, " << answers.taken_bytes
-                                  << " are gone from the device; peak " << answers.peak_bytes << " of "
-                                  << answers.predicted_peak_bytes << " predicted");
+    const OptixAnswers a = trace_by_optix(scene, test_rays(scene, 1 << 20, 1.0f, 3), false);
+    CHECK(a.facts.peak_bytes <= a.facts.predicted_peak_bytes);
+    WARN(fmt::format("structure and stacks: {} bytes are counted, {} are gone from the device; peak {} of {} predicted",
+                     a.facts.bytes, a.taken_bytes, a.facts.peak_bytes, a.facts.predicted_peak_bytes));
 }

@@ -142,7 +142,6 @@ struct DeviceOptix::Parts {
     Pipeline pipeline;
     OptixParams params;
     DeviceBuffer<OptixParams> on_device{1, "parameters of OptiX"};
-    double build_seconds = 0;
 
     Parts(const Scene& scene, const SceneView& view, uint64_t room)
         : structure(build_optix_structure(optix, scene, view, room)), pipeline(optix, structure.two_levels),
@@ -152,7 +151,9 @@ struct DeviceOptix::Parts {
 DeviceOptix::DeviceOptix(const Scene& scene, const SceneView& on_device, uint64_t room) {
     const auto start = Clock::now();
     parts_ = std::make_unique<Parts>(scene, on_device, room);
-    parts_->build_seconds = seconds_since(start);
+    const OptixStructure& made = parts_->structure;
+    facts_ = {made.bytes + parts_->pipeline.bytes() + parts_->on_device.bytes(), made.peak_bytes,
+              made.predicted_peak_bytes, seconds_since(start)};
 }
 DeviceOptix::~DeviceOptix() = default;
 
@@ -197,12 +198,5 @@ bool DeviceOptix::can_be_captured(cudaStream_t stream) const {
     }
     return false;
 }
-
-uint64_t DeviceOptix::bytes() const {
-    return parts_->structure.bytes + parts_->pipeline.bytes() + parts_->on_device.bytes();
-}
-uint64_t DeviceOptix::peak_bytes() const { return parts_->structure.peak_bytes; }
-uint64_t DeviceOptix::predicted_peak_bytes() const { return parts_->structure.predicted_peak_bytes; }
-double DeviceOptix::build_seconds() const { return parts_->build_seconds; }
 
 }  // namespace ambilux
