@@ -26,7 +26,7 @@ RenderSettings on_device(const Scene& scene, const char* integrator, const char*
 
 }  // namespace
 
-TEST_CASE("Images with OptiX have the expectation of those with cwbvh, in graphs and kernel by kernel") {
+TEST_CASE("Images with OptiX have the expectation of those with cwbvh") {
     if (!optix()) return;
     const std::pair<const char*, const char*> methods[] = {
         {"path", "wavefront"}, {"bdpt", "lvc"}, {"bdpt", "streaming"}};
@@ -37,13 +37,10 @@ TEST_CASE("Images with OptiX have the expectation of those with cwbvh, in graphs
             RenderSettings s = on_device(scene, integrator, variant, "optix");
             s.seed = own.seed + 1;
             const Estimate expected = render_batches(scene, own, 512);
-            for (const bool graph : {true, false}) {
-                s.graph = graph;
-                INFO(name << ", " << variant << ", graph " << graph);
-                const ZTestResult z = z_test(render_batches(scene, s, 512), expected);
-                INFO(z.report());
-                CHECK(z.pass);
-            }
+            INFO(name << ", " << variant);
+            const ZTestResult z = z_test(render_batches(scene, s, 512), expected);
+            INFO(z.report());
+            CHECK(z.pass);
         }
 }
 

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 
-#include "backends/cuda/graph_capture.h"
 #include "backends/cuda/optix/params.h"
 #include "backends/cuda/optix/structure.h"
-#include "core/log.h"
 #include "core/seconds.h"
 
 namespace ambilux {
@@ -17,8 +15,6 @@ extern const char kOptixPrograms[];
 extern const unsigned long kOptixProgramsSize;
 
 namespace {
-
-__global__ void enter(cudaGraphConditionalHandle handle) { cudaGraphSetConditional(handle, 1); }
 
 struct alignas(OPTIX_SBT_RECORD_ALIGNMENT) Record {
     char header[OPTIX_SBT_RECORD_HEADER_SIZE];
@@ -167,36 +163,6 @@ void DeviceOptix::take(const HandedRays& handed, cudaStream_t stream) {
 
 void DeviceOptix::trace(bool any_hit, cudaStream_t stream) const {
     parts_->pipeline.launch(any_hit ? kOccluded : kClosest, parts_->on_device, parts_->params.handed.capacity, stream);
-}
-
-bool DeviceOptix::can_be_captured(cudaStream_t stream) const {
-    const HandedRays& handed = parts_->params.handed;
-    try {
-        GraphCapture graph(stream);
-        const Owned<cudaGraphExec_t> exec = graph.capture([&] {
-            const cudaGraphConditionalHandle handle = graph.make_condition();
-            enter<<<1, 1, 0, graph.stream()>>>(handle);
-            graph.conditional(cudaGraphCondTypeIf, handle, 1, [&](uint32_t) { trace(false, graph.stream()); });
-        });
-        // One ray. Whatever it meets, its place is written to, unless the launch was left out.
-        const Ray ray = {{0.0f, 0.0f, 0.0f}, 1.0f, {0.0f, 0.0f, 1.0f}, 0};
-        const Hit before = {-1.0f, 0.0f, 0.0f, 0};
-        const uint32_t one = 1;
-        DeviceMemory::put(handed.rays, &ray, sizeof(ray));
-        DeviceMemory::put(handed.hits, &before, sizeof(before));
-        DeviceMemory::put(handed.count, &one, sizeof(one));
-        cuda_check(cudaGraphLaunch(exec.get(), stream), "OptiX in a graph");
-        cuda_check(cudaStreamSynchronize(stream), "OptiX in a graph");
-        Hit after;
-        DeviceMemory::get(&after, handed.hits, sizeof(after));
-        DeviceMemory::clear(handed.count, sizeof(uint32_t));
-        if (after.t > 0.0f) return true;
-        log_info(
-            "accel=optix: a launch in a conditional node of a graph does nothing. Kernels are launched one by one");
-    } catch (const Error& e) {
-        log_info(std::string(e.what()) + " That was in a conditional node of a graph: kernels are launched one by one");
-    }
-    return false;
 }
 
 }  // namespace ambilux
