@@ -25,8 +25,8 @@ public:
     /// Where rays are handed over from now on. It launches once over none, so that what the driver allocates for
     /// launches is there. Waits.
     void take(const HandedRays& handed, cudaStream_t stream);
-    /// Follows the rays of the run that was handed over: to their nearest hits, or until anything blocks them. Not while
-    /// a graph is captured: in a conditional node such a launch is an illegal access.
+    /// Follows the rays of the run that was handed over: to their nearest hits, or until anything blocks them. Not
+    /// while a graph is captured: in a conditional node such a launch is an illegal access.
     void trace(bool any_hit, cudaStream_t stream) const;
     const OptixFacts& facts() const { return facts_; }
 

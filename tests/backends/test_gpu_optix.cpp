@@ -39,9 +39,7 @@ struct Differences {
     }
 };
 
-bool is_hit(const SceneView& view, const Hit& hit) {
-    return hit.prim < view.primitive_count() + view.instanced_count;
-}
+bool is_hit(const SceneView& view, const Hit& hit) { return hit.prim < view.primitive_count() + view.instanced_count; }
 /// Nearer to an edge than either test knows the crossing.
 bool at_edge(const SceneView& view, const Ray& ray, const Hit& hit) {
     if (!is_hit(view, hit) || !view.is_triangle(view.stored(hit.prim))) return false;

@@ -166,11 +166,10 @@ private:
         OptixTraversableHandle handle = 0;
         DeviceBuffer<std::byte> tree(input.sizes.outputSizeInBytes, "OptiX's structure");
         DeviceBuffer<std::byte> temporary(input.sizes.tempSizeInBytes, "memory of OptiX's builder");
-        optix_.check(
-            optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()), temporary.bytes(),
-                            address_of(tree.data()), tree.bytes(), &handle,
-                            is_compacted(input.input) ? &emit : nullptr, is_compacted(input.input)),
-            "building its structure");
+        optix_.check(optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()),
+                                     temporary.bytes(), address_of(tree.data()), tree.bytes(), &handle,
+                                     is_compacted(input.input) ? &emit : nullptr, is_compacted(input.input)),
+                     "building its structure");
         wait_for_default_stream("building OptiX's structure");
         note_peak(tree.bytes() + temporary.bytes());
         temporary = {};
