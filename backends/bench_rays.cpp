@@ -121,7 +121,7 @@ nlohmann::json bench_optix(const Scene& scene, int repetitions) {
     need_device();
     const std::vector<RayBatch> batches = device_batches(scene, CwbvhAccel(scene));
     const OptixTimings timings = time_rays_by_optix(scene, batches, kBenchWarmUps, repetitions);
-    return on_device(batches, timings.batches, "optix", repetitions, timings.build_seconds, timings.bytes);
+    return on_device(batches, timings.batches, "optix", repetitions, timings.facts.build_seconds, timings.facts.bytes);
 }
 
 template <class Accel>

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "backends/optix.h"
 #include "scene/ray.h"
 #include "scene/scene.h"
 
@@ -18,10 +19,9 @@ std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& ray
 
 /// What OptiX answers (accel=optix), through a structure built for this call.
 struct OptixAnswers {
-    std::vector<Hit> hits;     ///< as those of trace_on_device
-    uint64_t bytes = 0;        ///< that it is said to take, with the stacks of its launches
-    uint64_t taken_bytes = 0;  ///< that are gone from the device beside scene and rays: with the driver's own
-    uint64_t peak_bytes = 0, predicted_peak_bytes = 0;  ///< of the structure while it was built
+    std::vector<Hit> hits;    ///< as those of trace_on_device
+    int64_t taken_bytes = 0;  ///< that are gone from the device beside scene and rays: with the driver's own
+    OptixFacts facts;
 };
 /// Throws Error(device) without a device or the driver's library, Error(usage) in a build without OptiX.
 OptixAnswers trace_by_optix(const Scene& scene, const std::vector<Ray>& rays, bool any_hit);

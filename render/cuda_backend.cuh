@@ -309,15 +309,13 @@ private:
         executor_.emplace(stream_.get(), traced_, state_, clock_.data(), maker_.view, wave_.order);
         if constexpr (!Maker::kFilmWide)
             if (structure_.pairs()) executor_->use(structure_.pairs()->tracer());
-        bool graphs = maker_.settings.graph;
         if (DeviceOptix* const optix = structure_.optix()) {
             optix->take(wave_.handed, stream_.get());
             executor_->use(*optix, wave_.handed);
-            graphs = graphs && optix->can_be_captured(stream_.get());
         }
         phases_.clear();
         const auto start = Clock::now();
-        if (graphs) {
+        if (maker_.settings.graph) {
             Capture capture = {*this};
             run_iteration<Integrator>(capture);
         }

@@ -33,7 +33,7 @@ public:
         }
         if (settings.accel == AccelKind::optix) {
             optix_ = std::make_unique<DeviceOptix>(scene, accels.get<DeviceScene>()->view(), room);
-            bytes_ = optix_->bytes();
+            bytes_ = optix_->facts().bytes;
             return pilot ? HostTracer(accels.get<CwbvhAccel>()->tracer()) : HostTracer();  // as with cwbvh
         }
         if (settings.build == Build::fast) build_fast(scene, settings, accels, room);
@@ -57,9 +57,11 @@ public:
     }
     /// As find() knows them.
     uint64_t bytes() const { return bytes_; }
-    uint64_t resident_bytes() const { return optix_ ? optix_->bytes() : pairs_ ? pairs_->bytes() : wide_->bytes(); }
+    uint64_t resident_bytes() const {
+        return optix_ ? optix_->facts().bytes : pairs_ ? pairs_->bytes() : wide_->bytes();
+    }
     /// While a device has built it.
-    uint64_t peak_bytes() const { return optix_ ? optix_->peak_bytes() : fast_ ? fast_->peak_bytes() : 0; }
+    uint64_t peak_bytes() const { return optix_ ? optix_->facts().peak_bytes : fast_ ? fast_->peak_bytes() : 0; }
     const char* name() const { return optix_ ? "optix" : pairs_ ? "bvh2" : "cwbvh"; }
     /// Null unless the device has built it.
     const DeviceFastCwbvh* fast() const { return fast_.get(); }

@@ -63,7 +63,8 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
         s.queues.ordering = cuda && variant.traits.sorts && several_bsdfs ? Ordering::material : Ordering::none;
     s.queues.keyed_hits =
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several_bsdfs;
-    if (cuda && !cuda_graphs_choose()) s.graph = false;
+    // OptiX cannot launch inside of a conditional node.
+    if (cuda && (!cuda_graphs_choose() || s.accel == AccelKind::optix)) s.graph = false;
     if (!light_tree_pays(scene)) s.light_picking = LightPicks::table;
     s.build = settled_build(s, cuda, scene);
     if (s.draws == CacheDraws::automatic && variant.traits.draws_together)

@@ -7,6 +7,7 @@
 
 #include "accel/cwbvh.h"
 #include "accel/pair_bvh.h"
+#include "backends/optix.h"
 #include "backends/ray_batches.h"
 #include "scene/scene.h"
 
@@ -29,8 +30,7 @@ std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, c
 
 struct OptixTimings {
     std::vector<std::vector<KernelTiming>> batches;
-    uint64_t bytes = 0;
-    double build_seconds = 0;
+    OptixFacts facts;
 };
 /// The same by OptiX (accel=optix). Throws Error(usage) in a build without it.
 OptixTimings time_rays_by_optix(const Scene& scene, const std::vector<RayBatch>& batches, int warm_ups,

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "backends/handed_rays.h"
+#include "backends/optix.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -24,21 +25,15 @@ public:
     /// Where rays are handed over from now on. It launches once over none, so that what the driver allocates for
     /// launches is there. Waits.
     void take(const HandedRays& handed, cudaStream_t stream);
-    /// Follows the rays of the run that was handed over: to their nearest hits, or until anything blocks them.
+    /// Follows the rays of the run that was handed over: to their nearest hits, or until anything blocks them. Not
+    /// while a graph is captured: in a conditional node such a launch is an illegal access.
     void trace(bool any_hit, cudaStream_t stream) const;
-    /// Whether launches can be part of a graph, inside of a conditional node. Asks by a small one, and logs why not.
-    bool can_be_captured(cudaStream_t stream) const;
-
-    /// On the device: the structure, and what launches take for stacks.
-    uint64_t bytes() const;
-    /// Of the structure while it is built: the most, and what was predicted before anything was allocated.
-    uint64_t peak_bytes() const;
-    uint64_t predicted_peak_bytes() const;
-    double build_seconds() const;
+    const OptixFacts& facts() const { return facts_; }
 
 private:
     struct Parts;
     std::unique_ptr<Parts> parts_;
+    OptixFacts facts_;
 };
 
 }  // namespace ambilux

@@ -244,12 +244,12 @@ private:
     bool hands_over([[maybe_unused]] const Stage& stage, [[maybe_unused]] const detail::Items& items) {
         if constexpr (kOptixBuilt) {
             if (!optix_) return false;
-            const uint32_t threads = (handed_.capacity - 1) / detail::kHandBlock + 1;
+            const uint32_t grid = (handed_.capacity - 1) / detail::kHandBlock + 1;
             for (uint64_t first = 0; first < items.capacity; first += handed_.capacity) {
-                detail::hand_over<<<threads, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
+                detail::hand_over<<<grid, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
                 cuda_check(cudaGetLastError(), Stage::kName);
                 optix_->trace(Stage::kAnyHit, stream());
-                detail::take_back<<<threads, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
+                detail::take_back<<<grid, detail::kHandBlock, 0, stream()>>>(stage, items, handed_, uint32_t(first));
             }
             return true;
         }

@@ -9,14 +9,6 @@ namespace ambilux::detail {
 
 constexpr uint32_t kHandBlock = 128;
 
-/// A ray in two loads and stores.
-union PackedRay {
-    float4 words[2];
-    Ray ray;
-    __device__ PackedRay() {}
-};
-static_assert(sizeof(PackedRay) == sizeof(Ray));
-
 /// Those of items `first`, first + 1, ..., as many as there is room for; a thread each.
 template <class Stage>
 __global__ void __launch_bounds__(kHandBlock)
@@ -26,19 +18,19 @@ __global__ void __launch_bounds__(kHandBlock)
     if (k >= min(left, handed.capacity)) return;
     const Items items = all.of(n);
     const uint32_t place = items.place(first + k);
-    PackedRay packed;
+    Ray ray;
     bool found = items.claim(place);
     if constexpr (Stage::kAnyHit) {
         typename Stage::Kept kept;
-        found = found && stage.fetch(place, packed.ray, kept);
+        found = found && stage.fetch(place, ray, kept);
     } else {
-        found = found && stage.fetch(place, packed.ray);
+        found = found && stage.fetch(place, ray);
     }
     handed.hits[k].prim = found ? kNone : kNotHanded;
     if (!found) return;
     float4* const to = reinterpret_cast<float4*>(handed.rays + k);
-    to[0] = packed.words[0];
-    to[1] = packed.words[1];
+    to[0] = make_float4(ray.o.x, ray.o.y, ray.o.z, ray.tmax);
+    to[1] = make_float4(ray.d.x, ray.d.y, ray.d.z, __uint_as_float(ray.alpha_seed));
 }
 
 /// What has become of them. Shadow rays are fetched again for what they would bring: only valid ones were handed over,

@@ -18,11 +18,6 @@ DeviceOptix::DeviceOptix(const Scene&, const SceneView&, uint64_t) { throw not_b
 DeviceOptix::~DeviceOptix() = default;
 void DeviceOptix::take(const HandedRays&, cudaStream_t) { throw not_built(); }
 void DeviceOptix::trace(bool, cudaStream_t) const { throw not_built(); }
-bool DeviceOptix::can_be_captured(cudaStream_t) const { throw not_built(); }
-uint64_t DeviceOptix::bytes() const { throw not_built(); }
-uint64_t DeviceOptix::peak_bytes() const { throw not_built(); }
-uint64_t DeviceOptix::predicted_peak_bytes() const { throw not_built(); }
-double DeviceOptix::build_seconds() const { throw not_built(); }
 
 OptixAnswers trace_by_optix(const Scene&, const std::vector<Ray>&, bool) { throw not_built(); }
 OptixTimings time_rays_by_optix(const Scene&, const std::vector<RayBatch>&, int, int) { throw not_built(); }

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 
-#include "backends/cuda/graph_capture.h"
 #include "backends/cuda/optix/params.h"
 #include "backends/cuda/optix/structure.h"
-#include "core/log.h"
 #include "core/seconds.h"
 
 namespace ambilux {
@@ -17,8 +15,6 @@ extern const char kOptixPrograms[];
 extern const unsigned long kOptixProgramsSize;
 
 namespace {
-
-__global__ void enter(cudaGraphConditionalHandle handle) { cudaGraphSetConditional(handle, 1); }
 
 struct alignas(OPTIX_SBT_RECORD_ALIGNMENT) Record {
     char header[OPTIX_SBT_RECORD_HEADER_SIZE];
@@ -142,7 +138,6 @@ struct DeviceOptix::Parts {
     Pipeline pipeline;
     OptixParams params;
     DeviceBuffer<OptixParams> on_device{1, "parameters of OptiX"};
-    double build_seconds = 0;
 
     Parts(const Scene& scene, const SceneView& view, uint64_t room)
         : structure(build_optix_structure(optix, scene, view, room)), pipeline(optix, structure.two_levels),
@@ -152,7 +147,9 @@ struct DeviceOptix::Parts {
 DeviceOptix::DeviceOptix(const Scene& scene, const SceneView& on_device, uint64_t room) {
     const auto start = Clock::now();
     parts_ = std::make_unique<Parts>(scene, on_device, room);
-    parts_->build_seconds = seconds_since(start);
+    const OptixStructure& made = parts_->structure;
+    facts_ = {made.bytes + parts_->pipeline.bytes() + parts_->on_device.bytes(), made.peak_bytes,
+              made.predicted_peak_bytes, seconds_since(start)};
 }
 DeviceOptix::~DeviceOptix() = default;
 
@@ -167,42 +164,5 @@ void DeviceOptix::take(const HandedRays& handed, cudaStream_t stream) {
 void DeviceOptix::trace(bool any_hit, cudaStream_t stream) const {
     parts_->pipeline.launch(any_hit ? kOccluded : kClosest, parts_->on_device, parts_->params.handed.capacity, stream);
 }
-
-bool DeviceOptix::can_be_captured(cudaStream_t stream) const {
-    const HandedRays& handed = parts_->params.handed;
-    try {
-        GraphCapture graph(stream);
-        const Owned<cudaGraphExec_t> exec = graph.capture([&] {
-            const cudaGraphConditionalHandle handle = graph.make_condition();
-            enter<<<1, 1, 0, graph.stream()>>>(handle);
-            graph.conditional(cudaGraphCondTypeIf, handle, 1, [&](uint32_t) { trace(false, graph.stream()); });
-        });
-        // One ray. Whatever it meets, its place is written to, unless the launch was left out.
-        const Ray ray = {{0.0f, 0.0f, 0.0f}, 1.0f, {0.0f, 0.0f, 1.0f}, 0};
-        const Hit before = {-1.0f, 0.0f, 0.0f, 0};
-        const uint32_t one = 1;
-        DeviceMemory::put(handed.rays, &ray, sizeof(ray));
-        DeviceMemory::put(handed.hits, &before, sizeof(before));
-        DeviceMemory::put(handed.count, &one, sizeof(one));
-        cuda_check(cudaGraphLaunch(exec.get(), stream), "OptiX in a graph");
-        cuda_check(cudaStreamSynchronize(stream), "OptiX in a graph");
-        Hit after;
-        DeviceMemory::get(&after, handed.hits, sizeof(after));
-        DeviceMemory::clear(handed.count, sizeof(uint32_t));
-        if (after.t > 0.0f) return true;
-        log_info(
-            "accel=optix: a launch in a conditional node of a graph does nothing. Kernels are launched one by one");
-    } catch (const Error& e) {
-        log_info(std::string(e.what()) + " That was in a conditional node of a graph: kernels are launched one by one");
-    }
-    return false;
-}
-
-uint64_t DeviceOptix::bytes() const {
-    return parts_->structure.bytes + parts_->pipeline.bytes() + parts_->on_device.bytes();
-}
-uint64_t DeviceOptix::peak_bytes() const { return parts_->structure.peak_bytes; }
-uint64_t DeviceOptix::predicted_peak_bytes() const { return parts_->structure.predicted_peak_bytes; }
-double DeviceOptix::build_seconds() const { return parts_->build_seconds; }
 
 }  // namespace ambilux

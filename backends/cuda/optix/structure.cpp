@@ -99,7 +99,8 @@ public:
     Builder(const OptixContext& optix, const Scene& scene, const SceneView& on_device)
         : optix_(optix), scene_(scene), inputs_(2 + scene.groups.size()),
           boxes_(boxes_of(scene.quadrics), "boxes of shapes for OptiX") {
-        inputs_[0].of_triangles(on_device, 0, on_device.ungrouped_count());
+        // Of the host's view: that of the device knows its groups there.
+        inputs_[0].of_triangles(on_device, 0, scene.view().ungrouped_count());
         inputs_[1].of_quadrics(boxes_);
         for (size_t g = 0; g < scene.groups.size(); ++g)
             inputs_[2 + g].of_triangles(on_device, scene.groups[g].first_triangle, scene.groups[g].triangle_count);
@@ -165,10 +166,10 @@ private:
         OptixTraversableHandle handle = 0;
         DeviceBuffer<std::byte> tree(input.sizes.outputSizeInBytes, "OptiX's structure");
         DeviceBuffer<std::byte> temporary(input.sizes.tempSizeInBytes, "memory of OptiX's builder");
-        optix_.check(
-            optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()), temporary.bytes(),
-                            address_of(tree.data()), tree.bytes(), &handle, &emit, is_compacted(input.input)),
-            "building its structure");
+        optix_.check(optixAccelBuild(optix_.get(), nullptr, &o, &input.input, 1, address_of(temporary.data()),
+                                     temporary.bytes(), address_of(tree.data()), tree.bytes(), &handle,
+                                     is_compacted(input.input) ? &emit : nullptr, is_compacted(input.input)),
+                     "building its structure");
         wait_for_default_stream("building OptiX's structure");
         note_peak(tree.bytes() + temporary.bytes());
         temporary = {};

@@ -36,7 +36,6 @@ private:
 OptixAnswers trace_by_optix(const Scene& scene, const std::vector<Ray>& rays, bool any_hit) {
     wait_for_default_stream("rays");
     const uint64_t before = free_device_bytes();
-    const uint64_t scene_bytes = DeviceScene::predicted_bytes(scene);
     RayArrays arrays(scene);
     const DeviceOptix& optix = arrays.optix();
     OptixAnswers answers;
@@ -46,12 +45,9 @@ OptixAnswers trace_by_optix(const Scene& scene, const std::vector<Ray>& rays, bo
         wait_for_default_stream("ray traversal by OptiX");
         answers.hits = arrays.hits();
     }
-    answers.bytes = optix.bytes();
-    answers.peak_bytes = optix.peak_bytes();
-    answers.predicted_peak_bytes = optix.predicted_peak_bytes();
-    const uint64_t taken = before - std::min(before, free_device_bytes()),
-                   others = scene_bytes + rays.size() * (sizeof(Ray) + sizeof(Hit));
-    answers.taken_bytes = taken - std::min(taken, others);
+    answers.facts = optix.facts();
+    answers.taken_bytes = int64_t(before - free_device_bytes()) -
+                          int64_t(DeviceScene::predicted_bytes(scene) + rays.size() * (sizeof(Ray) + sizeof(Hit)));
     return answers;
 }
 
@@ -69,8 +65,7 @@ OptixTimings time_rays_by_optix(const Scene& scene, const std::vector<RayBatch>&
         }
         timings.batches.push_back({timing});
     }
-    timings.bytes = arrays.optix().bytes();
-    timings.build_seconds = arrays.optix().build_seconds();
+    timings.facts = arrays.optix().facts();
     return timings;
 }
 
