@@ -217,8 +217,7 @@ TEST_CASE("Nothing found, nothing preferred; few samples and extreme sums stay f
     const Toy toy = {kTwo, 0.8, of_none};
     for (const uint32_t samples : {0u, 1u, 2u, 3u, 4u})
         for (const Lane& lane : toy.learned(OptimalLearning::least_squares, samples, 5)) {
-            const Rgb learned = start_of<Rgb>(lane);
-            CHECK((is_finite(learned) && max_component(learned) < 100));
+            CHECK(is_finite(start_of<Rgb>(lane)));
         }
 }
 
