@@ -217,8 +217,7 @@ TEST_CASE("Nothing found, nothing preferred; few samples and extreme sums stay f
     const Toy toy = {kTwo, 0.8, of_none};
     for (const uint32_t samples : {0u, 1u, 2u, 3u, 4u})
         for (const Lane& lane : toy.learned(OptimalLearning::least_squares, samples, 5)) {
-            const Rgb learned = start_of<Rgb>(lane);
-            CHECK((is_finite(learned) && max_component(learned) < 100));
+            CHECK(is_finite(start_of<Rgb>(lane)));
         }
 }
 
@@ -227,15 +226,15 @@ TEST_CASE("Images with optimal weights have the expectation of the path tracer")
          first_or_all<const char*>(2, {"cornell", "lamps", "lights", "materials", "textured", "glass", "bathroom"})) {
         Scene scene = project_scene(name, 48, 32);
         scene.integrator.hide_emitters = true;
-        const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 768).film);
+        const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 512).film);
         for (const SettingTexts& own : std::vector<SettingTexts>{
                  {},
                  {{"optimal_vertices", "3"}, {"optimal_block", "3"}, {"optimal_samples", "1"}, {"rr_depth", "1"}}}) {
-            const Estimate image = render_until_seen(scene, optimal(scene, 12, own), 768, path, 0.03);
+            const Estimate image = render_until_seen(scene, optimal(scene, 12, own), 512, path, 0.05);
             const ZTestResult z = z_test(image, path);
             INFO(name << ": " << z.report());
             CHECK(z.pass);
-            CHECK(sees_bias(image, path, 0.03));
+            CHECK(sees_bias(image, path, 0.05));
         }
     }
 }
@@ -293,7 +292,7 @@ TEST_CASE("Scenes without light and paths of few segments") {
     for (const double v : r.film.sum) CHECK(v == 0);
 }
 
-TEST_CASE("Under round lamps optimal weights have a fourth of the variance of the path tracer at most") {
+TEST_CASE("Under round lamps optimal weights have an eighth of the variance of the path tracer at most") {
     const Scene scene = project_scene("lamps", 48, 36);
     constexpr uint32_t kSamples = 256;
     // Of the later half, when most is learned.
@@ -303,18 +302,15 @@ TEST_CASE("Under round lamps optimal weights have a fourth of the variance of th
         renderer->clear_film();
         renderer->render(kSamples / 2, kSamples / 2);
         const FilmMoments m = renderer->film();
-        const double n = double(m.samples), all = mean_of(m);
+        const double n = double(m.samples);
         double sum = 0;
-        for (size_t i = 0; i < m.sum.size(); ++i) {
-            const double mean = m.sum[i] / n;
-            sum += (m.sum_squares[i] / n - mean * mean) / (mean * mean + 0.01 * all * all);
-        }
+        for (size_t i = 0; i < m.sum.size(); ++i) sum += m.sum_squares[i] / n - sqr(m.sum[i] / n);
         return sum / double(m.sum.size());
     };
     const double plain = variance(cpu_settings(scene, Estimator::mis, 1)), best = variance(optimal(scene, 2)),
                  one = variance(optimal(scene, 3, {{"optimal_strategies", "1"}}));
     INFO("variance of a sample: " << plain << " path, " << best << " optimal, " << one << " with one next event");
-    CHECK(best < plain / 4);
+    CHECK(best < plain / 8);
     CHECK(one < plain);
     CHECK(best < one);
 }

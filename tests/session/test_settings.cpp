@@ -147,8 +147,8 @@ TEST_CASE("stress has the methods that variants name, each once") {
         for (const Stressed& s : v.stress)
             if (!v.outside) names.push_back(s.name);
     CHECK(names == std::vector<std::string>{"path-naive", "path-nee", "path-mis", "path-mis-power", "path-ris",
-                                            "path-guided", "light", "light-power", "bdpt", "bdpt-power", "lvc",
-                                            "lvc-power", "streaming", "streaming-power", "megakernel",
+                                            "path-guided", "path-optimal", "light", "light-power", "bdpt", "bdpt-power",
+                                            "lvc", "lvc-power", "streaming", "streaming-power", "megakernel",
                                             "megakernel-power", "vcm"});
 }
 
