@@ -44,6 +44,7 @@ struct alignas(16) GuideProgress {
     uint32_t leaves;         ///< of the tree over space
     float unit[kGuideSums];  ///< of each GuideSum; 0: not known before light was found
     uint32_t updating;       ///< the step at work makes new trees
+    int64_t found;           ///< by it: records that brought something
 };
 
 struct GuidedState {
@@ -96,7 +97,7 @@ struct GuidedState {
         put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
         put(tree.grid, std::vector<uint32_t>(GuideTree::kGridCells, GuideTree::kLeafBit));
         put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1, 1.0f, 0.0f}});
-        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0}});
+        put(progress, std::vector<GuideProgress>{{0, 0, 0, 1, {}, 0, 0}});
     }
     template <class Visit>
     void for_each_saved(Visit visit) const {

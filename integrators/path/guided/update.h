@@ -35,6 +35,7 @@ struct BeginUpdate : GuideStep {
     AMBILUX_HD void operator()(uint32_t) const {
         GuideProgress& p = progress();
         p.updating = is_due() && p.unit[0] > 0.0f;
+        p.found = 0;
         if (!is_due()) return;
         for (uint32_t k = 0; k < kGuideSums; ++k)
             if (p.unit[k] == 0.0f) p.unit[k] = unit_of(state.exponents + k * GuidedState::kExponents);
@@ -66,6 +67,7 @@ struct RefineQuads : GuideStep {
         const float total = sum_up(first, of.quads);
         const int64_t found = found_in(first);
         state.records[leaf] = found;
+        fetch_add_shared(&progress().found, found);
         if (!(total > 0.0f)) return;
         const uint32_t nodes = rebuild(first, total, float(found));
         for (uint64_t k = 4ull * first; k < 4ull * (first + max(nodes, uint32_t(of.quads))); ++k)
@@ -165,12 +167,15 @@ private:
     }
 };
 
-/// How many leaves a leaf gets beside: it is halved until each would have no more records than a threshold.
+/// How many leaves a leaf gets beside: it is halved until each would have no more records than a threshold, with which
+/// all of them have room.
 struct CountSplits : GuideStep {
     AMBILUX_HD void operator()(uint32_t leaf) const {
         state.splits[leaf] = 0;
-        if (!progress().updating || leaf >= progress().leaves) return;
-        const float most = float(settings.split) * sqrtf(float(1u << min(progress().updates, 30u)));
+        const GuideProgress& p = progress();
+        if (!p.updating || leaf >= p.leaves || p.leaves == state.most_leaves) return;
+        const float most = max(float(settings.split) * sqrtf(float(1u << min(p.updates, 30u))),
+                               2.0f * float(p.found) / float(state.most_leaves - p.leaves));
         float records = float(state.records[leaf]);
         if (tree().leaves[leaf].bsdf_share == 1.0f) return;
         uint32_t levels = 0, depth = tree().leaves[leaf].depth;
