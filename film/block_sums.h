@@ -9,10 +9,10 @@ namespace ambilux {
 
 /// One image in one block and channel.
 struct BlockSum {
-    double mean = 0;       ///< sum of the pixels' means
-    double variance = 0;   ///< sum of their variances
-    double dof_terms = 0;  ///< sum of v²/(n-1), for Welch-Satterthwaite
-    double max_abs = 0;    ///< sum of absolute means
+    double mean = 0;                                          ///< sum of the pixels' means
+    double variance = 0;                                      ///< sum of their variances
+    double dof_terms = 0;                                     ///< sum of v²/(n-1), for Welch-Satterthwaite
+    double max_abs = 0;                                       ///< sum of absolute means
     double events = std::numeric_limits<double>::infinity();  ///< random events that made the variance; see block_sum()
 };
 

@@ -7,12 +7,12 @@
 namespace ambilux {
 
 struct EquivalenceOptions {
-    double mean = 1e-3;       ///< relative difference of the whole image's means, from which on one could see it
-    double block = 1e-2;      ///< the same of a block, in each channel, relative to the block's mean over its channels
-    uint32_t size = 32;       ///< pixels along the side of a block
-    double floor = 0.1;       ///< a block darker than this share of the image's mean is measured by that share of it
-    double level = 0.05;      ///< chance of calling images equivalent that differ by so much or more
-    double min_events = 32;   ///< random events that a block must have met on both sides; else nothing is shown
+    double mean = 1e-3;      ///< relative difference of the whole image's means, from which on one could see it
+    double block = 1e-2;     ///< the same of a block, in each channel, relative to the block's mean over its channels
+    uint32_t size = 32;      ///< pixels along the side of a block
+    double floor = 0.1;      ///< a block darker than this share of the image's mean is measured by that share of it
+    double level = 0.05;     ///< chance of calling images equivalent that differ by so much or more
+    double min_events = 32;  ///< random events that a block must have met on both sides; else nothing is shown
 };
 
 struct Equivalence {

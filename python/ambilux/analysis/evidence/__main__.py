@@ -66,7 +66,8 @@ def needed(place, file, shown):
     if file.suffix != ".exr" or set(inside) & set(LEFT_OUT):
         return False
     if inside[-2] == "references":
-        return file.name.startswith(tuple(scene for _, scene in shown))
+        of_claims = inside[0] == "claims"
+        return file.name.startswith(tuple(scene for name, scene in shown if of_claims != (name in stages.BY_NAME)))
     return file.stem.endswith("_1") and (inside[0] if inside[0] != "claims" else inside[2], inside[-2]) in shown
 
 

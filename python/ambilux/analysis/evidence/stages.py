@@ -51,7 +51,7 @@ STAGES = (
     Stage("waves", "performance.md", 90, parts=benches.waves, tables=benches.waves_tables),
     Stage("builders", "performance.md", 120, parts=benches.builders, tables=benches.builders_tables),
     Stage("devices", "scaling.md", 150, DEVICES, parts=benches.devices, tables=benches.devices_tables),
-    Stage("textures", "scaling.md", 40, parts=benches.textures, tables=benches.textures_tables),
+    Stage("textures", "scaling.md", 100, parts=benches.textures, tables=benches.textures_tables),
     Stage("model", "scaling.md", 30, NOTHING, parts=benches.model, tables=benches.model_tables),
     Stage("cpu", "performance.md", 240, CPU, parts=benches.cpu, tables=benches.cpu_tables),
     Stage("peers", "peers.md", 1800, CPU, experiment="experiments/peers.toml", kinds=PEERS, spread=CAUSTIC),
