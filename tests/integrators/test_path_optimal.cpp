@@ -227,13 +227,12 @@ TEST_CASE("Images with optimal weights have the expectation of the path tracer")
         scene.integrator.hide_emitters = true;
         const uint32_t most = is_long_run() ? 2048 : 512;  // rare bright samples of small emitters
         const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), most).film);
-        for (const SettingTexts& own : std::vector<SettingTexts>{
-                 {},
-                 {{"optimal_learning", "densities"},
-                  {"optimal_vertices", "3"},
-                  {"optimal_block", "3"},
-                  {"optimal_samples", "1"},
-                  {"rr_depth", "1"}}}) {
+        for (const SettingTexts& own : std::vector<SettingTexts>{{},
+                                                                 {{"optimal_learning", "densities"},
+                                                                  {"optimal_vertices", "3"},
+                                                                  {"optimal_block", "3"},
+                                                                  {"optimal_samples", "1"},
+                                                                  {"rr_depth", "1"}}}) {
             const Estimate image = render_until_seen(scene, optimal(scene, 12, own), most, path, 0.05);
             const ZTestResult z = z_test(image, path);
             INFO(name << ": " << z.report());
