@@ -222,15 +222,18 @@ TEST_CASE("Nothing found, nothing preferred; few samples and extreme sums stay f
 }
 
 TEST_CASE("Images with optimal weights have the expectation of the path tracer") {
-    for (const char* name :
-         first_or_all<const char*>(2, {"cornell", "lamps", "lights", "materials", "textured", "glass", "bathroom"})) {
+    for (const char* name : first_or_all<const char*>(2, {"cornell", "lamps", "lights", "materials", "textured"})) {
         Scene scene = project_scene(name, 48, 32);
         scene.integrator.hide_emitters = true;
-        const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), 512).film);
-        for (const SettingTexts& own : std::vector<SettingTexts>{
-                 {},
-                 {{"optimal_vertices", "3"}, {"optimal_block", "3"}, {"optimal_samples", "1"}, {"rr_depth", "1"}}}) {
-            const Estimate image = render_until_seen(scene, optimal(scene, 12, own), 512, path, 0.05);
+        const uint32_t most = is_long_run() ? 2048 : 512;  // rare bright samples of small emitters
+        const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), most).film);
+        for (const SettingTexts& own : std::vector<SettingTexts>{{},
+                                                                 {{"optimal_learning", "densities"},
+                                                                  {"optimal_vertices", "3"},
+                                                                  {"optimal_block", "3"},
+                                                                  {"optimal_samples", "1"},
+                                                                  {"rr_depth", "1"}}}) {
+            const Estimate image = render_until_seen(scene, optimal(scene, 12, own), most, path, 0.05);
             const ZTestResult z = z_test(image, path);
             INFO(name << ": " << z.report());
             CHECK(z.pass);
