@@ -116,7 +116,7 @@ def switches_table(experiment, lines, bad):
 
 def agreement_cell(entry):
     a = entry.get("agreement") or {}
-    if entry["state"] in ("missing", "refused"):
+    if entry["state"] == "refused":
         return f"{peers.STATES[entry['state']]}: {entry.get('reason') or 'no reason given'}"
     if a.get("relative_difference") is None:
         return peers.STATES[entry["state"]]
