@@ -14,6 +14,7 @@
 #include <array>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <thread>
 
 #include "core/atomic_file.h"
@@ -77,19 +78,31 @@ struct Plane {
     }
 };
 
-/// Threads that compress blocks of rows side by side. One takes a second for 1920x1080 pixels of noise.
-int compressing_threads() {
-    static const int threads = [] {
-        const int n = std::clamp(int(std::thread::hardware_concurrency()), 1, 16);
-        Imf::setGlobalThreadCount(n);
-        return n;
-    }();
-    return threads;
-}
+/// Threads that compress blocks of rows of a large image side by side: one takes a second for 1920x1080 pixels of noise.
+/// They end with this object, since a process that forks later would wait for them in its child.
+class CompressingThreads {
+public:
+    explicit CompressingThreads(uint64_t pixels) {
+        if (pixels < 1u << 18) return;
+        lock_ = std::unique_lock(mutex_);
+        count_ = std::clamp(int(std::thread::hardware_concurrency()), 1, 16);
+        Imf::setGlobalThreadCount(count_);
+    }
+    ~CompressingThreads() {
+        if (lock_) Imf::setGlobalThreadCount(0);
+    }
+    int count() const { return count_; }
+
+private:
+    static inline std::mutex mutex_;
+    std::unique_lock<std::mutex> lock_;
+    int count_ = 0;
+};
 
 std::string encode_planes(const std::string& path, uint32_t width, uint32_t height, const std::vector<Plane>& planes,
                           const Attributes& attributes) {
     ExrStream stream;
+    const CompressingThreads threads(uint64_t(width) * height);
     try {
         Imf::Header header{int(width), int(height)};
         header.compression() = Imf::ZIP_COMPRESSION;
@@ -102,7 +115,7 @@ std::string encode_planes(const std::string& path, uint32_t width, uint32_t heig
                 frame.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(data + c)),
                                                   stride, stride * width));
             }
-        Imf::OutputFile file(stream, header, compressing_threads());
+        Imf::OutputFile file(stream, header, threads.count());
         file.setFrameBuffer(frame);
         file.writePixels(int(height));
     } catch (const std::exception& e) {

@@ -34,7 +34,7 @@ std::string another(const Setting& s) {
     const std::string standard = s.default_text();
     for (const char* value : {"true",     "false",  "light",      "lvc",   "cpu",  "nee",    "power", "hits",
                               "coherent", "cwbvh",  "tree",       "sobol", "good", "moment", "none",  "select",
-                              "double",   "pinned", "consistent", "world", "0.25", "2",      "1",     "16"}) {
+                              "double",   "pinned", "consistent", "world", "densities", "0.25", "2",      "1",     "16"}) {
         RenderSettings settings;
         try {
             s.what.set(settings, value);
