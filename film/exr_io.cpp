@@ -78,8 +78,8 @@ struct Plane {
     }
 };
 
-/// Threads that compress blocks of rows of a large image side by side: one takes a second for 1920x1080 pixels of noise.
-/// They end with this object, since a process that forks later would wait for them in its child.
+/// Threads that compress blocks of rows of a large image side by side: one takes a second for 1920x1080 pixels of
+/// noise. They end with this object, since a process that forks later would wait for them in its child.
 class CompressingThreads {
 public:
     explicit CompressingThreads(uint64_t pixels) {

@@ -32,9 +32,10 @@ std::string refusal(const std::function<void()>& f) {
 /// Another value than the default, as text.
 std::string another(const Setting& s) {
     const std::string standard = s.default_text();
-    for (const char* value : {"true",     "false",  "light",      "lvc",   "cpu",  "nee",    "power", "hits",
-                              "coherent", "cwbvh",  "tree",       "sobol", "good", "moment", "none",  "select",
-                              "double",   "pinned", "consistent", "world", "densities", "0.25", "2",      "1",     "16"}) {
+    for (const char* value :
+         {"true",       "false", "light",     "lvc",  "cpu",    "nee",  "power",  "hits",   "coherent",
+          "cwbvh",      "tree",  "sobol",     "good", "moment", "none", "select", "double", "pinned",
+          "consistent", "world", "densities", "0.25", "2",      "1",    "16"}) {
         RenderSettings settings;
         try {
             s.what.set(settings, value);

@@ -101,6 +101,12 @@ def stored(outcome, images):
             "rows": rows, "left_out": list(outcome.left_out), "picture": picture(outcome, images) or "", "facts": list(facts(outcome))}
 
 
+def not_run(claim):
+    """Of a claim without data."""
+    return {"says": "not run", "verdict": "not run", "why": "there are no data of it yet", "full": False, "columns": [], "rows": [], "left_out": [],
+            "picture": "", "facts": [f"Command: `scripts/claims.sh --only {claim.name}`"]}
+
+
 def section(claim, found, images):
     link = f", [doi:{claim.doi}](https://doi.org/{claim.doi})" if claim.doi else ""
     yield from [f"## {claim.title}", "", f"{claim.paper}{link}.", ""]
@@ -120,6 +126,7 @@ def section(claim, found, images):
 def markdown(claims, blocks, images, root, told=()):
     """The page, for a file in the folder `root`; pictures are in the folder `images`. blocks: {claim: stored()}. told: lines on where it was run."""
     folder, where = (os.path.relpath(path, root) for path in (claims[0].file.parent, images))
+    blocks = {c.name: blocks.get(c.name) or not_run(c) for c in claims}
     full = [blocks[c.name]["says"] for c in claims if blocks[c.name]["full"]]
     counts = f" Of these {evaluate.counted(full)}." if full else ""
     docs = os.path.normpath(os.path.relpath("docs", root) + "/x")[:-1]
