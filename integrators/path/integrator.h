@@ -109,14 +109,19 @@ struct PathIntegrator {
 
     template <class Executor>
     static void schedule(Executor& exec, const Stages& s) {
-        if (s.policy.rules.max_depth == 0) return;
-        start_eye_subpaths<kFusion.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
-        repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several_bounces) {
+        if (s.policy.rules.max_depth > 0) eye_subpaths<kFusion.generate>(exec, s, s.generate);
+    }
+    /// From camera rays by `generate` on; `before`: repeat_depths.
+    template <bool kFused, class Executor, class Generate, class Before = NothingBefore>
+    static void eye_subpaths(Executor& exec, const Stages& s, const Generate& generate, Before before = {}) {
+        start_eye_subpaths<kFused>(exec, generate, s.extend[0], s.wave.tiles * kTilePixels);
+        const auto rest = [&](bool several_bounces) {
             run_emission(exec, s.eye);
             if (!s.policy.rules.next_event) return;
             if constexpr (!kFusion.connect) exec.run(s.connect_emitter);
             run_candidates(exec, s.eye, several_bounces);
-        });
+        };
+        repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, rest, before);
         exec.set_depth(0);
     }
 };

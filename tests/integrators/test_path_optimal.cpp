@@ -254,22 +254,7 @@ TEST_CASE("What is learned depends on no thread and no size of waves, and a stop
     }
     CHECK(one.stats.memory_bytes == one.stats.memory_bytes_predicted);
     CHECK(one.stats.invalid.total() == 0);
-
-    const auto first = make_renderer(scene, s), second = make_renderer(scene, s);
-    CHECK(first->iteration_samples() == 4);
-    CHECK(first->state_kind() == StateKind::per_device);
-    CHECK_THROWS_AS(first->render(0, 6), Error);
-    first->render(0, 8);
-    const std::vector<std::byte> saved = first->save_state();
-    const FilmMoments before = first->film();
-    second->load_state(saved);
-    second->render(8, 4);
-    FilmMoments whole = second->film();
-    for (size_t i = 0; i < whole.sum.size(); ++i) whole.sum[i] += before.sum[i];
-    for (size_t i = 0; i < whole.sum.size(); ++i) CHECK(whole.sum[i] == Approx(one.film.sum[i]).epsilon(1e-12));
-    first->render(8, 4);
-    CHECK(first->save_state() == second->save_state());
-    CHECK(first->film().sum == one.film.sum);
+    check_resumes_from_state(scene, s, one);
 }
 
 TEST_CASE("Stages of their own and fused ones make the same image") {

@@ -1,5 +1,5 @@
 // What is asked of methods whose iterations are whole (docs/architecture.md): that no thread, wave or budget decides a
-// bit, and that a render goes on from its film alone.
+// bit, and that a render goes on from its film, and from its state where it keeps one.
 #pragma once
 
 #include <tbb/global_control.h>
@@ -76,6 +76,25 @@ inline void check_resumes_from_film(const Scene& scene, const RenderSettings& s)
         for (size_t i = 0; i < parts.size(); ++i) parts[i] += film.sum[i];
     }
     for (size_t i = 0; i < parts.size(); ++i) CHECK(parts[i] == Approx(whole.sum[i]).epsilon(1e-12));
+}
+
+/// `s` asks for iterations of four samples; `one`: its image of twelve.
+inline void check_resumes_from_state(const Scene& scene, const RenderSettings& s, const RenderResult& one) {
+    const auto first = make_renderer(scene, s), second = make_renderer(scene, s);
+    CHECK(first->iteration_samples() == 4);
+    CHECK(first->state_kind() == StateKind::per_device);
+    CHECK_THROWS_AS(first->render(0, 6), Error);
+    first->render(0, 8);
+    const std::vector<std::byte> saved = first->save_state();
+    const FilmMoments before = first->film();
+    second->load_state(saved);
+    second->render(8, 4);
+    FilmMoments whole = second->film();
+    for (size_t i = 0; i < whole.sum.size(); ++i) whole.sum[i] += before.sum[i];
+    for (size_t i = 0; i < whole.sum.size(); ++i) CHECK(whole.sum[i] == Approx(one.film.sum[i]).epsilon(1e-12));
+    first->render(8, 4);
+    CHECK(first->save_state() == second->save_state());
+    CHECK(first->film().sum == one.film.sum);
 }
 
 }  // namespace ambilux

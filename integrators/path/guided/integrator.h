@@ -142,19 +142,9 @@ private:
     template <bool kFused, class Executor, class Generate>
     static void paths(Executor& exec, const Stages& s, const typename Path::Stages& p, const Generate& generate) {
         if (p.policy.rules.max_depth == 0) return;
-        const uint32_t slots = p.wave.tiles * kTilePixels;
-        start_eye_subpaths<kFused>(exec, generate, p.extend[0], slots);
-        repeat_depths(
-            exec, p.eye_vertex, p.extend, 0,
-            [&](bool several_bounces) {
-                run_emission(exec, p.eye);
-                if (!p.policy.rules.next_event) return;
-                if constexpr (!kFusion.connect) exec.run(p.connect_emitter);
-                run_candidates(exec, p.eye, several_bounces);
-            },
-            [&](int k, const auto&) { exec.for_each(s.record[k], s.record[k].hits); });
-        exec.set_depth(0);
-        exec.run_slots(s.learn, slots >> s.learn.training.shift);
+        Path::template eye_subpaths<kFused>(exec, p, generate,
+                                            [&](int k, const auto&) { exec.for_each(s.record[k], s.record[k].hits); });
+        exec.run_slots(s.learn, p.wave.tiles * kTilePixels >> s.learn.training.shift);
     }
     template <class Executor>
     static void learn(Executor& exec, const Stages& s, uint32_t round) {

@@ -108,20 +108,10 @@ private:
     template <class Executor>
     static void wave(Executor& exec, const Stages& s) {
         const typename Path::Stages& p = s.path;
-        const uint32_t slots = p.wave.tiles * kTilePixels;
         if (p.policy.rules.max_depth == 0) return;
-        start_eye_subpaths<kFusion.generate>(exec, s.generate, p.extend[0], slots);
-        repeat_depths(
-            exec, p.eye_vertex, p.extend, 0,
-            [&](bool several_bounces) {
-                run_emission(exec, p.eye);
-                if (!p.policy.rules.next_event) return;
-                if constexpr (!kFusion.connect) exec.run(p.connect_emitter);
-                run_candidates(exec, p.eye, several_bounces);
-            },
-            [&](int k, const auto&) { exec.for_each(s.hits[k], s.hits[k].hits); });
-        exec.set_depth(0);
-        exec.run_slots(s.add, slots, 1);
+        Path::template eye_subpaths<kFusion.generate>(
+            exec, p, s.generate, [&](int k, const auto&) { exec.for_each(s.hits[k], s.hits[k].hits); });
+        exec.run_slots(s.add, p.wave.tiles * kTilePixels, 1);
     }
 };
 
