@@ -8,6 +8,7 @@
 #include "film/ztest.h"
 #include "session/parallel/parallel_render.h"
 #include "tests/support/gpu_device.h"
+#include "tests/support/optix_device.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -54,11 +55,10 @@ TEST_CASE("deterministic renders have the same bits on one device and on several
     }
 }
 
-TEST_CASE("lvc with a cache on each device is the same estimate") {
-    if (!device()) return;
-    const Scene scene = project_scene("cornell", 64, 48);
-    const test::TempFolder folder;
-    ParallelRequest request = request_for(scene, folder, "lvc");
+namespace {
+
+/// On several devices as on one, in the expectation.
+void check_same_estimate(ParallelRequest request, const Scene& scene) {
     request.budget.samples = 2000;
     request.range_size = 100;
     request.devices = {"0"};
@@ -70,6 +70,24 @@ TEST_CASE("lvc with a cache on each device is the same estimate") {
         INFO(z.report());
         CHECK(z.pass);
     }
+}
+
+}  // namespace
+
+TEST_CASE("lvc with a cache on each device is the same estimate") {
+    if (!device()) return;
+    const Scene scene = project_scene("cornell", 64, 48);
+    const test::TempFolder folder;
+    check_same_estimate(request_for(scene, folder, "lvc"), scene);
+}
+
+TEST_CASE("OptiX with a structure on each device is the same estimate") {
+    if (!optix()) return;
+    const Scene scene = project_scene("cornell", 64, 48);
+    const test::TempFolder folder;
+    ParallelRequest request = request_for(scene, folder, "wavefront");
+    request.settings.accel = AccelKind::optix;
+    check_same_estimate(request, scene);
 }
 
 TEST_CASE("a device that is not there is named") {

@@ -5,12 +5,14 @@
 #include <cmath>
 
 #include "film/ztest.h"
+#include "integrators/registry.h"
 #include "scene/ray.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/instanced_scene.h"
 #include "tests/support/long_run.h"
 #include "tests/support/optix_device.h"
 #include "tests/support/render_scene.h"
+#include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
 
@@ -44,6 +46,22 @@ TEST_CASE("Images with OptiX have the expectation of those with cwbvh") {
             INFO(z.report());
             CHECK(z.pass);
         }
+}
+
+TEST_CASE("Every method that launches its rays has the image of cwbvh, from the same random numbers, with OptiX") {
+    if (!optix() || !is_long_run()) return;
+    for (const char* name : {"cornell", "materials"}) {
+        const Scene scene = project_scene(name, 64, 48);
+        for (const Variant& v : variants()) {
+            if (v.traits.one_kernel || v.outside) continue;
+            INFO(name << ", " << v.name());
+            const auto mean = [&](const char* accel) {
+                const RenderSettings s = on_device(scene, v.integrator.c_str(), v.variant.c_str(), accel);
+                return mean_of(render_scene(scene, s, 1024).film);
+            };
+            CHECK(mean("optix") == Approx(mean("cwbvh")).epsilon(5e-3));
+        }
+    }
 }
 
 TEST_CASE("Instances and masks have their image with OptiX") {
