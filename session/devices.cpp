@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "backends/optix.h"
+
 namespace ambilux {
 namespace {
 
@@ -29,9 +31,10 @@ nlohmann::json devices_json(const CudaReport& r) {
                            {"memory_bytes", d.memory_bytes},
                            {"kernels", kernels_text(d.kernels)},
                            {"problem", d.problem}});
-    return {
-        {"toolkit", r.toolkit}, {"kernels", built_text(r.built)}, {"driver", r.driver}, {"driver_cuda", r.driver_cuda},
-        {"graphs", r.graphs},   {"problem", r.problem},           {"devices", devices}};
+    return {{"toolkit", r.toolkit}, {"kernels", built_text(r.built)},
+            {"driver", r.driver},   {"driver_cuda", r.driver_cuda},
+            {"graphs", r.graphs},   {"optix", kOptixBuilt},
+            {"problem", r.problem}, {"devices", devices}};
 }
 
 std::string devices_text(const CudaReport& r) {
@@ -40,6 +43,7 @@ std::string devices_text(const CudaReport& r) {
                                    built_text(r.built), known_or(r.driver, "none"), known_or(r.driver_cuda, "none"));
     if (!r.driver_cuda.empty() && !r.graphs)
         text += "graphs: the driver is older than CUDA 12.8, so that kernels are launched one by one (graph=false)\n";
+    text += kOptixBuilt ? "OptiX: built in (accel=optix)\n" : "OptiX: not built in\n";
     if (!r.problem.empty()) text += fmt::format("no device: {}\n", r.problem);
     for (const CudaDevice& d : r.devices) text += device_text(d);
     return text;

@@ -190,7 +190,7 @@ TEST_CASE("devices says which devices there are, or what is missing") {
     CHECK(text.out.starts_with("CUDA"));
     CHECK(version.out.ends_with(text.out));
     const json j = json::parse(run(folder, {"devices", "--json", "-"}).out);
-    for (const char* name : {"toolkit", "kernels", "driver", "driver_cuda", "graphs", "problem", "devices"})
+    for (const char* name : {"toolkit", "kernels", "driver", "driver_cuda", "graphs", "optix", "problem", "devices"})
         CHECK(j.contains(name));
     // Either a device, or a reason; of each device kernels, or a reason.
     CHECK(j["devices"].empty() == !j["problem"].get<std::string>().empty());

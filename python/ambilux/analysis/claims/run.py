@@ -45,9 +45,13 @@ def called(command):
     return done.stdout
 
 
+def devices(place):
+    """What the program says of devices and of itself."""
+    return json.loads(place.call("--quiet", "devices", "--json", "-"))
+
+
 def has_device(place):
-    found = json.loads(place.call("--quiet", "devices", "--json", "-"))["devices"]
-    return any(not d["problem"] for d in found)
+    return any(not d["problem"] for d in devices(place)["devices"])
 
 
 def status_file(out, claim):

@@ -16,7 +16,7 @@ import tarfile
 from pathlib import Path
 
 from ambilux.analysis.claims import registry
-from ambilux.analysis.claims.run import Failed, has_device
+from ambilux.analysis.claims.run import Failed, devices, has_device
 from ambilux.analysis.evidence import run, stages
 
 MORE = 75
@@ -31,9 +31,10 @@ def chosen(o, place):
             raise Failed(f"--only {unknown[0]}: there are {', '.join(stages.BY_NAME)}")
         return [s for s in stages.STAGES if s.name in o.only]
     count = len(run.gpus())
-    device = has_device(run.claim_runs.Place(place.program, place.out, place.quick))
-    fits = {stages.CPU: o.cpu or place.quick, stages.NOTHING: o.cpu or place.quick, stages.CUDA: device or place.quick, stages.DEVICES: count > 1 or place.quick}
-    return [s for s in stages.STAGES if fits[s.needs]]
+    program = run.claim_runs.Place(place.program, place.out, place.quick)
+    device = has_device(program)
+    fits = {stages.CPU: o.cpu, stages.NOTHING: o.cpu, stages.CUDA: device, stages.DEVICES: count > 1, stages.OPTIX: device and devices(program)["optix"]}
+    return [s for s in stages.STAGES if place.quick or fits[s.needs]]
 
 
 def run_all(o, place):

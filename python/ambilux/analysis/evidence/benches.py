@@ -166,16 +166,37 @@ def builders(place):
             yield part("builders", name, key, ambilux("bench", "rays", path, "--backend", backend, *more))
 
 
+def ratios_of_rates(before, after):
+    """Mean and least, as texts, of the rates of two structures, batch by batch."""
+    before, after = rates(before), rates(after)
+    ratios = {batch: after[batch] / rate for batch, rate in before.items() if rate > 0 and after.get(batch, 0) > 0}
+    least = min(ratios, key=ratios.get)
+    mean = math.exp(sum(map(math.log, ratios.values())) / len(ratios))
+    return f"{mean:.2f}", f"{ratios[least]:.2f} {least}"
+
+
 def builders_tables(results):
     def cells(of):
         good, fast = of("good"), of("fast")
-        before, after = rates(good), rates(fast)
-        ratios = {batch: after[batch] / rate for batch, rate in before.items() if rate > 0 and after.get(batch, 0) > 0}
-        least = min(ratios, key=ratios.get)
-        mean = math.exp(sum(map(math.log, ratios.values())) / len(ratios))
-        return [good["build_seconds"], fast["build_seconds"], f"{mean:.2f}", f"{ratios[least]:.2f} {least}"]
+        return [good["build_seconds"], fast["build_seconds"], *ratios_of_rates(good, fast)]
     columns = ("good: build in s", "fast: build in s", "ratio of rates, mean", "minimum")
     return {"builders": by_scene(results, "builders", columns, cells)}
+
+
+# OptiX
+
+def optix(place):
+    more = ("--repetitions", "2") if place.quick else ()
+    for name, path in scenes_of(place):
+        for key, backend in (("own", "cpu-cwbvh"), ("optix", "cpu-bvh2")) if place.quick else (("own", "cuda"), ("optix", "cuda-optix")):
+            yield part("optix", name, key, ambilux("bench", "rays", path, "--backend", backend, *more))
+
+
+def optix_tables(results):
+    def cells(of):
+        own, other = of("own"), of("optix")
+        return [*(f"{x['accel_bytes'] / 1e6:.3g} MB, {x['build_seconds']:.2f} s" for x in (own, other)), *ratios_of_rates(own, other)]
+    return {"rates": by_scene(results, "optix", ("cwbvh", "OptiX", "ratio of rates, mean", "minimum"), cells)}
 
 
 # Several devices

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ambilux.analysis.evidence import benches
 
-# What a stage needs. DEVICES: two or more. NOTHING: no machine in particular, such as a simulation.
-CPU, CUDA, DEVICES, NOTHING = "cpu", "cuda", "cuda 2", "nothing"
+# What a stage needs. DEVICES: two or more. OPTIX: a program that was built with it. NOTHING: no machine in particular, such as a simulation.
+CPU, CUDA, DEVICES, OPTIX, NOTHING = "cpu", "cuda", "cuda 2", "optix", "nothing"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ STAGES = (
     Stage("frames", "performance.md", 60, parts=benches.frames, tables=benches.frames_tables),
     Stage("waves", "performance.md", 90, parts=benches.waves, tables=benches.waves_tables),
     Stage("builders", "performance.md", 120, parts=benches.builders, tables=benches.builders_tables),
+    Stage("optix", "performance.md", 140, OPTIX, parts=benches.optix, tables=benches.optix_tables),
     Stage("devices", "scaling.md", 150, DEVICES, parts=benches.devices, tables=benches.devices_tables),
     Stage("textures", "scaling.md", 100, parts=benches.textures, tables=benches.textures_tables),
     Stage("model", "scaling.md", 30, NOTHING, parts=benches.model, tables=benches.model_tables),
