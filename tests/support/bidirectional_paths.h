@@ -32,6 +32,7 @@ template <class Mis>
 Rules<Mis> all_rules(const Mis& mis) {
     Rules<Mis> r{};
     r.mis = mis;
+    if constexpr (requires { directions_of(mis); }) r.directions = directions_of(mis);
     r.max_depth = kMaxDepth;
     r.rr_depth = ~0u;
     r.count_hits = r.count_environment = r.next_event = r.splat = r.connect = true;
@@ -267,6 +268,8 @@ inline float reverse_pdf(const Scattering& s, Vec3f wo_world) {
 
 /// What a model of weights knows of merges.
 inline OracleMerges merges_of(const BidirectionalMis&) { return {}; }
+/// How eye subpaths sample directions.
+inline EyeDensity eye_density_of(const SceneView&, const BidirectionalMis&) { return {}; }
 
 /// `Mis`: the model whose weights are compared. Merges have weights in sums only (sum_of_weights).
 template <class Mis>
@@ -464,7 +467,7 @@ private:
 
     /// `counts`: strategy s has a candidate, which is `c`.
     void compare(Kind kind, uint32_t s, const Candidate<Mis>& c, const OraclePath& path, bool counts = true) {
-        const OracleSteps steps = oracle_steps(scene_, path, false);
+        const OracleSteps steps = steps_of(path, false);
         const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_subpaths),
                                                        double(mis_.connections), merges_of(mis_));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies
@@ -487,8 +490,7 @@ private:
         if (error <= 1e-4) {
             tally_.worst = std::max(tally_.worst, error);
         } else {
-            const double bound =
-                oracle_weight_error(all, oracle_steps(scene_, path, true), s, mis_.strategies, mis_.heuristic);
+            const double bound = oracle_weight_error(all, steps_of(path, true), s, mis_.strategies, mis_.heuristic);
             ++tally_.ill;
             if (!(bound < 0.1)) {
                 ++tally_.unbounded;
@@ -500,6 +502,17 @@ private:
         }
         count(kind, path);
         if (index_ % 4 == 0) sum_of_weights(path);
+    }
+
+    OracleSteps steps_of(const OraclePath& path, bool conditioning) const {
+        return oracle_steps(scene_, path, conditioning, eye_density_of(scene_, mis_));
+    }
+    /// Of the direction `wo` and of the way back.
+    BsdfValue densities(const Vertex<Mis>& v, Vec3f wo, Side side) const {
+        const BsdfValue f = {{1, 1, 1}, scatter_pdf<F>(v.scattering, wo), reverse_pdf(v.scattering, wo)};
+        if constexpr (requires { rules_.directions.template densities<F>(v, wo, transport_mode(side), f); })
+            return rules_.directions.template densities<F>(v, wo, transport_mode(side), f);
+        return f;
     }
 
     std::string describe(const OraclePath& path) const {
@@ -577,7 +590,8 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
         if (!connect_to_camera<F>(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
         path.to_eye[k - 1] = camera.wi;
     }
-    const auto go_on = [&](const Vertex<Mis>& vertex, const OraclePath::Vertex& x, Vec3f wo, Subpath<Mis>& w) {
+    const auto go_on = [&](Side side, const Vertex<Mis>& vertex, const OraclePath::Vertex& x, Vec3f wo,
+                           Subpath<Mis>& w) {
         float forward = 1.0f, reverse = 1.0f;
         if (x.delta) {
             const Scattering& s = vertex.scattering;
@@ -588,15 +602,19 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
                 return false;
             reverse = delta_reverse_pdf(s, wo, sample.eta);
         } else {
-            forward = scatter_pdf<F>(vertex.scattering, wo);
-            reverse = reverse_pdf(vertex.scattering, wo);
+            const BsdfValue f = densities(vertex, wo, side);
+            forward = f.pdf_sa;
+            reverse = f.pdf_reverse_sa;
             if (!(forward > 0.0f)) return false;
         }
         w.sums = mis_.sums_after_scatter(vertex.sums, vertex.first, x.delta, forward, reverse,
                                          fabsf(dot(vertex.point.ng, wo)));
         w.origin = vertex.point.p;
         w.direction = wo;
+        w.delta = x.delta;
         ++w.depth;
+        if constexpr (requires { rules_.directions.template complete<F>(side, vertex, w.throughput, w); })
+            rules_.directions.template complete<F>(side, vertex, w.throughput, w);
         return true;
     };
 
@@ -625,7 +643,7 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     w.origin = start.p;
     for (uint32_t i = 1; i < k; ++i) {
         y[i] = meet(Side::light, w, path.vertices[i]);
-        if (i + 1 < k && !go_on(y[i], path.vertices[i], path.to_eye[i], w)) return;
+        if (i + 1 < k && !go_on(Side::light, y[i], path.vertices[i], path.to_eye[i], w)) return;
     }
     // Eye subpath over x_(k-1) ... x_1, and its ray to x_0.
     const Vec3f axis = scene_.sensor.to_world.vector({0, 0, 1});
@@ -641,14 +659,13 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     for (uint32_t i = k - 1; i > 0; --i) {
         z[i] = meet(Side::eye, w, path.vertices[i]);
         if (i == 1 && path.vertices[1].delta && is_delta(e.type)) break;
-        if (!go_on(z[i], path.vertices[i], -path.to_eye[i - 1], w)) {
+        if (!go_on(Side::eye, z[i], path.vertices[i], -path.to_eye[i - 1], w)) {
             if (i > 1 || !is_delta(e.type)) return;
         }
     }
 
-    const OracleStrategies all =
-        oracle_strategies(scene_, path, oracle_steps(scene_, path, false), double(mis_.light_subpaths),
-                          double(mis_.connections), merges_of(mis_));
+    const OracleStrategies all = oracle_strategies(scene_, path, steps_of(path, false), double(mis_.light_subpaths),
+                                                   double(mis_.connections), merges_of(mis_));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {
@@ -678,9 +695,7 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
             const float over_power =
                 rules_.lights.over_power(scene_, Receiver{z[1].point.p, z[1].point.ng}, path.emitter, path.light.prim);
             light.pdf_sa *= over_power;
-            BsdfValue f{};
-            f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
-            f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
+            const BsdfValue f = densities(z[1], light.wi, Side::eye);
             ratio = mis_.template next_event_ratio<F>(scene_, over_power, z[1].sums, z[1].first, light, f,
                                                       fabsf(dot(z[1].point.ng, light.wi)));
         } else {
@@ -695,9 +710,7 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     if constexpr (requires { mis_.merge_ratio(y[0].sums, true, z[0].sums, true, BsdfValue{}); })
         for (uint32_t j = 1; j < k; ++j) {
             if (!(all.merges[j] > 0)) continue;
-            BsdfValue f{};
-            f.pdf_sa = scatter_pdf<F>(z[j].scattering, -path.to_eye[j - 1]);
-            f.pdf_reverse_sa = reverse_pdf(z[j].scattering, -path.to_eye[j - 1]);
+            const BsdfValue f = densities(z[j], -path.to_eye[j - 1], Side::eye);
             const float ratio = mis_.merge_ratio(y[j].sums, y[j].first, z[j].sums, z[j].first, f);
             const double weight = std::isnan(ratio)
                                       ? overflowed(oracle_merge_weight(all, j, mis_.strategies, mis_.heuristic))

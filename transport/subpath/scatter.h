@@ -36,6 +36,7 @@ AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& v
     const bool delta = s.flags & kScatterDelta;
     const uint32_t met = path.depth;
     if (met + 1 == rules.max_depth && !rules.mis.counts_last_segment(delta)) return false;
+    [[maybe_unused]] const Rgb before = path.throughput;
     path.throughput = path.throughput * s.weight;
     if (is_zero(path.throughput)) return false;
     const float cos_out = fabsf(dot(vertex.point.ng, s.wo));
@@ -47,6 +48,8 @@ AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& v
     if (side == Side::eye) path.roulette_scale = rounded_scale(path.roulette_scale * s.eta);
     path.delta = delta;
     path.depth = met + 1;
+    if constexpr (requires { rules.directions.template complete<F>(side, vertex, before, path); })
+        rules.directions.template complete<F>(side, vertex, before, path);
     return met < rules.rr_depth || survives(path, rules.rr_cap, u.w);
 }
 

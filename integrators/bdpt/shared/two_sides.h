@@ -138,11 +138,13 @@ void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>&
     });
 }
 
-/// `before(k, vertex)`: what else is done with the hits in place k, before stage `vertex`.
-template <class Executor, Features F, class Tracer, Fusion K, class Source, class Before = NothingBefore>
-void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, Before before = {}) {
+/// From camera rays by `generate` on, in all slots at once if `kFused` (start_eye_subpaths). `before(k, vertex)`: what
+/// else is done with the hits in place k, before stage `vertex`.
+template <bool kFused, class Executor, Features F, class Tracer, Fusion K, class Source, class Generate, class Before>
+void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, const Generate& generate,
+                      Before before) {
     const auto& rules = s.policy.rules;
-    start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
+    start_eye_subpaths<kFused>(exec, generate, s.extend[0], s.wave.tiles * kTilePixels);
     const auto rest = [&](bool several_bounces) {
         run_emission(exec, s.eye);
         if constexpr (!K.connect) exec.run(s.connect_emitter);
@@ -155,6 +157,10 @@ void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>
     };
     repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, rest, before);
     exec.set_depth(0);
+}
+template <class Executor, Features F, class Tracer, Fusion K, class Source, class Before = NothingBefore>
+void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, Before before = {}) {
+    run_eye_subpaths<K.generate>(exec, s, s.generate, before);
 }
 
 /// One wave.

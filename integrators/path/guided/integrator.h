@@ -1,157 +1,32 @@
-// path, variant guided: the path tracer samples directions from what it has learned about where light comes from
-// (Müller, Gross and Novák 2017, "Practical Path Guiding for Efficient Light-Transport Simulation"; Müller 2019, "Path
-// Guiding in Production", chapter 10; Rath et al. 2020, "Variance-Aware Path Guiding").
+// path, variant guided: the path tracer samples directions from what it has learned (integrators/shared/guide).
 #pragma once
 
-#include "accel/host_tracer.h"
-#include "integrators/path/guided/update.h"
 #include "integrators/path/integrator.h"
+#include "integrators/shared/guide/guided.h"
 
 namespace ambilux {
 
 template <Features F, class Tracer, Fusion kFusion>
-struct PathGuidedIntegrator {
-    using Mis = GuidedMis;
-    using Path = PathIntegrator<F, Tracer, kFusion, NextEvent, NoSettings, Mis>;
-    using State = GuidedState;
-    static constexpr bool kFilmWide = false;
-    static constexpr uint32_t kPhases = kGuideRounds + 1;
-    static constexpr uint32_t kTrainingPaths = 1u << 20;  ///< of an iteration, at most
-    static constexpr uint32_t kMostSamples = 256;         ///< of an iteration, unless it is told
+struct PathToGuide : PathIntegrator<F, Tracer, kFusion, NextEvent, NoSettings, GuidedMis<UnidirectionalMis>> {
+    using Path = PathIntegrator<F, Tracer, kFusion, NextEvent, NoSettings, GuidedMis<UnidirectionalMis>>;
 
-    struct Policy : Path::Policy {
-        GuidedSettings guided;
-        GuideTraining training;
-    };
-    static Policy plan(const Scene& scene, const RenderSettings& settings) {
-        Policy p = {Path::plan(scene, settings), GuidedSettings::plan(settings), {}};
-        const Sensor& s = scene.sensor;
-        if (p.guided.iteration_samples == 0)
-            p.guided.iteration_samples = iteration_samples(uint64_t(s.crop_width) * s.crop_height, settings);
-        p.waves.iteration_samples = p.guided.iteration_samples;
-        p.training.tiles = ((s.crop_width + kTileSide - 1) / kTileSide) * ((s.crop_height + kTileSide - 1) / kTileSide);
-        const uint64_t paths = uint64_t(s.crop_width) * s.crop_height * p.guided.iteration_samples;
-        while (p.training.shift < kMostShift && paths >> p.training.shift > kTrainingPaths) ++p.training.shift;
-        return p;
-    }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return Path::skipped(scene, p); }
-
-    struct Memory {
-        typename Path::Memory path;
-        GuideRecords records;
-    };
-    static Memory lay_out(Layout& layout, const Policy& p, const WaveSize& n) {
-        Memory m;
-        m.path = Path::lay_out(layout, p, n);
-        m.records = {layout.array<GuideRecord>(p.training.places(n.slots)),
-                     layout.allocate<uint32_t>(n.slots >> p.training.shift)};
-        return m;
-    }
-
-    struct Stages {
-        typename Path::Stages render, train;
-        GenerateGuided<GenerateEye<F, Mis>> generate;
-        GenerateTraining<GenerateGuided<GenerateEye<F, Mis>>> generate_training;
-        RecordRays<Mis> record[2];
-        LearnRecords learn;
-        GuideStep update;
-
-        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& policy, const Memory& m, const State& all)
-            : Stages(parts, m, placed(parts.scene, all), policy) {}
-
-        /// Those of training round `round`: paths of random numbers that no other has, and records of their own.
-        Stages of_round(uint32_t round) const {
-            Stages s = *this;
-            const uint32_t first_key = (round + 1) * s.train.wave.width * s.train.wave.height;
-            const auto rekey = [&](auto&... stages) { ((stages.wave.first_key = first_key), ...); };
-            rekey(s.train, s.train.extend[0], s.train.extend[1], s.train.eye_vertex[0], s.train.eye_vertex[1],
-                  s.train.connect_emitter, s.generate_training, s.learn);
-            s.generate_training.round = round;
-            s.generate_training.share = s.learn.share =
-                min(s.learn.training.shift + kGuideRounds - 1 - round, kMostShift);
-            s.learn.round = round;
-            return s;
-        }
-
-    private:
-        static State placed(const SceneView& scene, State s) {
-            const float size = scene.bounds_radius * 1.001f;
-            s.tree.low = scene.bounds_center - Vec3f{size, size, size};
-            s.tree.inverse_side = size > 0.0f ? 0.5f / size : 0.0f;
-            return s;
-        }
-        static Policy guided_by(Policy p, const State& s) {
-            p.rules.directions = {s.tree, p.guided.roulette};
-            p.rules.mis.tree = s.tree;
-            return p;
-        }
-        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& s, const Policy& p)
-            : render(parts, guided_by(p, s), m.path, {}), train(render) {
-            const auto note = [&](const char* name) { return parts.layout.record(name); };
-            const Lane* const samples = parts.film.samples;
-            name_training(note);
-            static_cast<GenerateEye<F, Mis>&>(generate) = render.generate;
-            static_cast<GenerateEye<F, Mis>&>(generate_training) = train.generate;
-            generate.over_pixel = generate_training.over_pixel = s.over_pixel;
-            generate.training = generate_training.training = p.training;
-            generate.made = generate_training.made = m.records.made;
-            generate_training.progress = s.progress;
-            for (int k = 0; k < 2; ++k)
-                record[k] = {parts.wave, p.training, m.path.subpaths.hits[k],
-                             m.records,  samples,    note(RecordRays<Mis>::kName)};
-            learn = {parts.wave, p.training, p.guided, s, m.records, samples, note(LearnRecords::kName)};
-            update = {s, p.guided, note(GuideStep::kName)};
-        }
-        /// Statistics tell apart what paths outside of the image take.
+    struct Training : Path::Stages {
         template <class Note>
-        void name_training(const Note& note) {
-            train.generate.record = note("train_generate");
-            for (auto& stage : train.extend) stage.record = note("train_extend");
-            for (auto& stage : train.eye_vertex) stage.record = note("train_shade");
+        Training(const typename Path::Stages& render, const Note& note) : Path::Stages(render) {
+            name_training(*this, note);
+        }
+        Training of_round(uint32_t round, const GuideProgress*) const {
+            Training t = *this;
+            number_training(t, round);
+            return t;
         }
     };
-
-    template <class Run>
-    static void iteration(Run& run) {
-        for (uint32_t round = 0; round < kGuideRounds; ++round) {
-            run.for_waves([round](auto& exec, const Stages& all) {
-                const Stages s = all.of_round(round);
-                paths<false>(exec, s, s.train, s.generate_training);  // of some slots alone
-            });
-            run.once([round](auto& exec, const Stages& s) { learn(exec, s, round); });
-        }
-        run.for_waves([](auto& exec, const Stages& s) { paths<kFusion.generate>(exec, s, s.render, s.generate); });
-        run.once([](auto& exec, const Stages& s) { learn(exec, s, kGuideRounds); });
-    }
-
-private:
-    static constexpr uint32_t kMostShift = 6;  ///< of GuideTraining: one slot of a tile
-
-    /// Where guide_samples leaves it open, a power of two: that of a film of so many pixels, and if it is known how
-    /// many samples there will be, one that divides them and lets trees become better several times.
-    static uint32_t iteration_samples(uint64_t pixels, const RenderSettings& settings) {
-        const uint64_t paths = std::is_same_v<Tracer, HostTracer> ? 1u << 18 : 1u << 23,
-                       samples = settings.expected_samples;
-        uint32_t n = 1;
-        while (n < kMostSamples && 2 * n * pixels <= paths) n *= 2;
-        while (n > 1 && samples > 0 && (samples % n != 0 || 8 * uint64_t(n) > samples)) n /= 2;
-        return n;
-    }
-
-    /// One wave. `kFused`: camera rays are made and traced at once, in all slots.
-    template <bool kFused, class Executor, class Generate>
-    static void paths(Executor& exec, const Stages& s, const typename Path::Stages& p, const Generate& generate) {
-        if (p.policy.rules.max_depth == 0) return;
-        Path::template eye_subpaths<kFused>(exec, p, generate,
-                                            [&](int k, const auto&) { exec.for_each(s.record[k], s.record[k].hits); });
-        exec.run_slots(s.learn, p.wave.tiles * kTilePixels >> s.learn.training.shift);
-    }
-    template <class Executor>
-    static void learn(Executor& exec, const Stages& s, uint32_t round) {
-        GuideStep step = s.update;
-        step.round = round;
-        GuideUpdate::of(step).run(exec);
+    template <bool kFused, class Executor, class Generate, class Before>
+    static void wave(Executor& exec, const typename Path::Stages& s, const Generate& generate, Before before) {
+        Path::template eye_subpaths<kFused>(exec, s, generate, before);
     }
 };
+template <Features F, class Tracer, Fusion kFusion>
+using PathGuidedIntegrator = GuidedOf<F, Tracer, kFusion, PathToGuide<F, Tracer, kFusion>>;
 
 }  // namespace ambilux

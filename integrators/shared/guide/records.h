@@ -2,8 +2,8 @@
 // when the wave is done.
 #pragma once
 
-#include "integrators/path/guided/directions.h"
-#include "integrators/path/guided/state.h"
+#include "integrators/shared/guide/directions.h"
+#include "integrators/shared/guide/state.h"
 #include "stages/stage.h"
 
 namespace ambilux {
@@ -70,6 +70,7 @@ struct GenerateGuided : Generate {
     uint32_t* made = nullptr;  ///< GuideRecords
 
     using Ray = typename Generate::Items::Ray;
+    using Sums = decltype(Generate::Items::Path::sums);
 
     AMBILUX_HD void operator()(uint32_t slot) const {
         Ray ray;
@@ -79,7 +80,9 @@ struct GenerateGuided : Generate {
         if (!Generate::make(slot, ray)) return false;
         if (training.trains(this->wave, slot)) made[slot >> training.shift] = 0;
         const float expected = over_pixel[GuideTraining::tile(this->wave, slot)];
-        ray.more = Ray::Sums::pack(GuidedSums::of(GuidedSums::OfRay{0, 0.0f, 0.0f, expected}, 0.0f)).more;
+        Sums sums = {};
+        sums.over_pixel = expected;
+        ray.more = Ray::Sums::pack(sums).more;
         return true;
     }
 };
@@ -124,8 +127,8 @@ struct RecordRays {
         if (start.bits.delta() || !training.trains(wave, start.path)) return;
         const RayItem ray = hits.load(i).ray;
         const Subpath<Mis> path = Items::unpack(ray);
-        const GuidedSums::OfRay sums = path.sums.of_ray();
-        const float pdf_sa = path.sums.pdf_sa, after = luminance(path.throughput);
+        const auto sums = path.sums;
+        const float pdf_sa = pdf_of_ray(sums), after = luminance(path.throughput);
         if (!(pdf_sa > 0.0f && pdf_sa < kInfinity && sums.before > 0.0f && sums.whole > 0.0f && after > 0.0f)) return;
         records.made[ray.path >> training.shift] |= 1u << (depth - 2);
         records.of_vertices.store(

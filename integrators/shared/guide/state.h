@@ -1,9 +1,9 @@
-// What variant guided keeps from iteration to iteration: the trees, and what was recorded since they were made.
+// What a guided variant keeps from iteration to iteration: the trees, and what was recorded since they were made.
 #pragma once
 
 #include "integrators/kept_state.h"
-#include "integrators/path/guided/settings.h"
-#include "integrators/path/guided/tree.h"
+#include "integrators/shared/guide/settings.h"
+#include "integrators/shared/guide/tree.h"
 
 namespace ambilux {
 

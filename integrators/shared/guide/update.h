@@ -1,7 +1,7 @@
 // New trees from what was recorded, between phases: by a thread for each leaf, whose number is bounded.
 #pragma once
 
-#include "integrators/path/guided/records.h"
+#include "integrators/shared/guide/records.h"
 
 namespace ambilux {
 

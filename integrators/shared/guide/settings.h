@@ -1,4 +1,4 @@
-// What variant guided of integrator path can be told.
+// What guided variants can be told.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,10 @@
-#include "integrators/path/guided/settings.h"
+#include "integrators/shared/guide/settings.h"
 
-#include "integrators/path/guided/variant.h"
+#include "integrators/shared/guide/variant.h"
 
 namespace ambilux {
 
-std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
+std::vector<Declaration<GuidedSettings>> GuidedVariant::settings() {
     using Of = Declare<GuidedSettings>;
     return {
         Of::choice("guide_target", &GuidedSettings::target, {"radiance", "moment"},
@@ -37,7 +37,7 @@ std::vector<Declaration<GuidedSettings>> PathGuidedVariant::settings() {
 }
 
 GuidedSettings GuidedSettings::plan(const RenderSettings& settings) {
-    return own_settings(PathGuidedVariant::settings(), settings);
+    return own_settings(GuidedVariant::settings(), settings);
 }
 
 }  // namespace ambilux

@@ -1,0 +1,25 @@
+// What variant guided of integrator bdpt has.
+#pragma once
+
+#include "integrators/offers.h"
+#include "integrators/shared/guide/variant.h"
+
+namespace ambilux {
+
+struct BdptGuidedVariant : GuidedVariant {
+    static constexpr const char* kHelp =
+        "lvc whose eye subpaths sample directions from what it has learned about where light comes from (path guiding, "
+        "Müller et al. 2017)";
+    static constexpr VariantTraits kTraits = {.strategies = true,
+                                              .light_subpaths = true,
+                                              .draws = true,
+                                              .draws_together = true,
+                                              .sorts = false,
+                                              .compacts = false,
+                                              .repeats = false};
+
+    /// Iterations of one sample: stress renders any number of them.
+    static std::vector<Stressed> stress() { return {{"bdpt-guided", {{"guide_samples", "1"}}, false}}; }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,167 @@
+// Directions of the BSDF and of what was learned, mixed.
+#pragma once
+
+#include "integrators/shared/guide/tree.h"
+#include "transport/mis/bidirectional.h"
+#include "transport/mis/unidirectional.h"
+#include "transport/subpath/bsdf_directions.h"
+#include "transport/subpath/roulette.h"
+
+namespace ambilux {
+
+/// Roughness of microfacets below which the BSDF alone samples: what such a lobe reflects is narrower than cells are.
+constexpr float kLeastGuidedAlpha = 0.05f;
+
+/// Lowest probability of surviving roulette: what was learned may be wrong, and survivors weigh more by its inverse.
+constexpr float kLeastSurvival = 0.1f;
+
+/// Survival of a subpath that is expected to bring as much as its pixel, were it no probability: what one brings
+/// varies.
+constexpr float kSurvivalOfExpected = 2.0f;
+
+template <Features F>
+AMBILUX_HD bool is_narrow(const Bsdf& b) {
+    return visit_bsdf<F>(b.type, false, [&](auto model) {
+        using Model = typename decltype(model)::type;
+        if constexpr (std::is_same_v<Model, RoughConductor> || std::is_same_v<Model, RoughDielectric>) {
+            const Resolved<Model> r = b.as<Model>();
+            return max(r.alpha_u, r.alpha_v) < kLeastGuidedAlpha;
+        } else {
+            return !Model::smooth;
+        }
+    });
+}
+
+/// What a subpath knows of the guide, beside the sums of a model of weights.
+template <class Base>
+struct GuidedSums : Base {
+    static constexpr uint32_t kVertexWords = sizeof(Base) / sizeof(float) + 1;
+
+    uint32_t leaf;     ///< of a vertex; of a ray: where it was scattered
+    float before;      ///< of an eye ray: luminance of the throughput there
+    float whole;       ///< and after it, without roulette
+    float over_pixel;  ///< 1 over what the pixel of an eye subpath is expected to be; 0: not known
+};
+
+/// Density of the direction of a scattered ray, unless that was a delta.
+AMBILUX_HD float pdf_of_ray(const UnidirectionalMis::Sums& ray) { return ray.pdf_sa; }
+AMBILUX_HD float pdf_of_ray(const MisSums& ray) { return 1.0f / ray.dvcm; }
+
+/// Eye subpaths: a share of directions comes from the BSDF, wherever anything can scatter, so no density is 0 where the
+/// integrand is not. All densities are those of the mixture but for deltas, which the BSDF alone finds. Light subpaths
+/// follow the BSDF, and know the mixture as the density of the way back.
+struct GuidedDirections {
+    GuideTree tree = {};
+    bool roulette = true;  ///< by what subpaths are expected to bring
+
+    template <Features F, class Mis>
+    AMBILUX_HD bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s) const {
+        if (mode == TransportMode::radiance) return mixed<F>(v, bsdf_share<F>(v), u, s);
+        if (!BsdfDirections::sample<F>(v, u, mode, s)) return false;
+        if (!(s.flags & kScatterDelta)) s.pdf_reverse_sa = mixture<F>(v, v.scattering.wi_world, s.pdf_reverse_sa);
+        return true;
+    }
+    template <Features F, class Mis>
+    AMBILUX_HD BsdfValue evaluate(const Vertex<Mis>& v, Vec3f wo, TransportMode mode) const {
+        const BsdfValue f = BsdfDirections::evaluate<F>(v, wo, mode);
+        return is_zero(f.value) ? f : densities<F>(v, wo, mode, f);
+    }
+    /// `f`, of the BSDF, with the densities of either side.
+    template <Features F, class Mis>
+    AMBILUX_HD BsdfValue densities(const Vertex<Mis>& v, Vec3f wo, TransportMode mode, BsdfValue f) const {
+        const bool eye = mode == TransportMode::radiance;
+        float& pdf_sa = eye ? f.pdf_sa : f.pdf_reverse_sa;
+        pdf_sa = mixture<F>(v, eye ? wo : v.scattering.wi_world, pdf_sa);
+        return f;
+    }
+    /// A delta has the probability that it has in the BSDF if light comes by it, and the share of the BSDF of it if an
+    /// eye subpath does.
+    template <Features F, class Mis>
+    AMBILUX_HD void complete(Side side, const Vertex<Mis>& v, Rgb before, Subpath<Mis>& path) const {
+        const bool narrow = is_narrow<F>(v.scattering.bsdf);
+        const GuideLeaf leaf = tree.leaves[v.sums.leaf];
+        if constexpr (Mis::kBidirectional)
+            if (path.delta && !narrow) path.sums.dvc *= side == Side::eye ? 1.0f / leaf.bsdf_share : leaf.bsdf_share;
+        if (side == Side::light) return;
+        path.sums.before = luminance(before);
+        path.sums.whole = luminance(path.throughput);
+        // Nothing was recorded of what follows a narrow lobe: no reason to end there.
+        if (roulette)
+            path.roulette_scale = scale_for_roulette(
+                max_component(path.throughput),
+                narrow || path.delta ? 1.0f : path.sums.before * leaf.reflected * path.sums.over_pixel);
+    }
+
+private:
+    /// Of directions at `v`.
+    template <Features F, class Mis>
+    AMBILUX_HD float bsdf_share(const Vertex<Mis>& v) const {
+        return is_narrow<F>(v.scattering.bsdf) ? 1.0f : tree.leaves[v.sums.leaf].bsdf_share;
+    }
+    /// Density with which an eye subpath leaves `v` for `d`, where the BSDF has `pdf_sa`.
+    template <Features F, class Mis>
+    AMBILUX_HD float mixture(const Vertex<Mis>& v, Vec3f d, float pdf_sa) const {
+        const float share = bsdf_share<F>(v);
+        return share < 1.0f ? share * pdf_sa + (1.0f - share) * tree.pdf_sa(v.sums.leaf, d) : pdf_sa;
+    }
+    /// From the BSDF with probability `share`, else from the quadtree of the leaf, in which either looks once.
+    template <Features F, class Mis>
+    AMBILUX_HD bool mixed(const Vertex<Mis>& v, float share, Vec3f u, BsdfSample& s) const {
+        constexpr TransportMode mode = TransportMode::radiance;
+        const bool guided = !(u.x < share);
+        if (!guided && !BsdfDirections::sample<F>(v, {u.x / share, u.y, u.z}, mode, s)) return false;
+        if (share == 1.0f) return true;
+        if (!guided && s.flags & kScatterDelta) return weigh(s, share * s.pdf_sa);
+        const Vec2f place = guided ? Vec2f{u.y, u.z} : square_of_direction(s.wo);
+        const GuideQuads::Cell cell = tree.quads.descend(v.sums.leaf, place, guided);
+        const float guide_sa = (1.0f - share) * kInv4Pi * cell.density;
+        if (!guided) return weigh(s, share * s.pdf_sa + guide_sa);
+        const Vec3f wo = square_to_sphere(cell.at);
+        if (!may_scatter(v.scattering, wo)) return false;
+        BsdfValue f = BsdfDirections::evaluate<F>(v, wo, mode);
+        if (is_zero(f.value)) return false;
+        f.pdf_sa = share * f.pdf_sa + guide_sa;
+        return smooth_sample(wo, f, 1.0f, 0, s);
+    }
+    AMBILUX_HD static bool weigh(BsdfSample& s, float pdf) {
+        s.weight = s.weight * (s.pdf_sa / pdf);
+        s.pdf_sa = pdf;
+        return true;
+    }
+    /// What Subpath::roulette_scale has to be so that roulette (survives) sees what the subpath is expected to bring,
+    /// of what its pixel is expected to be; if that is not known (0), its throughput, whose largest component is
+    /// `most`. Any value more than 0 is unbiased.
+    AMBILUX_HD static float scale_for_roulette(float most, float expected) {
+        constexpr float kAbove = 1.008f;  // what is sure stays so when the scale is rounded
+        if (!(expected > 0.0f && most > 1e-30f)) return 1.0f;
+        return rounded_scale(kAbove * sqrtf(clamp(kSurvivalOfExpected * expected, kLeastSurvival, 1.0f) / most));
+    }
+};
+
+/// The weights of `Base`, with the densities of the mixture.
+template <class Base>
+struct GuidedMis : Base {
+    using Directions = GuidedDirections;
+    using Sums = GuidedSums<typename Base::Sums>;
+
+    GuideTree tree = {};
+
+    template <Features F>
+    AMBILUX_HD void start_eye(const SceneView& scene, Vec3f d, Sums& sums, typename Base::Start& start) const {
+        sums = {};
+        Base::template start_eye<F>(scene, d, sums, start);
+    }
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
+                            const SurfacePoint& point) const {
+        return {Base::template sums_at<F>(scene, lights, side, path, sums, point), tree.leaf(point.p), 0.0f, 0.0f,
+                sums.over_pixel};
+    }
+    AMBILUX_HD Sums sums_after_scatter(const Sums& s, bool first, bool delta, float pdf_forward_sa,
+                                       float pdf_reverse_sa, float cos_out) const {
+        return {Base::sums_after_scatter(s, first, delta, pdf_forward_sa, pdf_reverse_sa, cos_out), s.leaf, 0.0f, 0.0f,
+                s.over_pixel};
+    }
+};
+
+}  // namespace ambilux
