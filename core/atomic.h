@@ -73,6 +73,14 @@ AMBILUX_HD void add_shared(double* sum, double value) {
 #endif
 }
 
+AMBILUX_HD void add_double(double* sum, double value) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(sum, value);
+#else
+    *sum += value;
+#endif
+}
+
 /// Adds to the first three of four floats, aligned to 16 bytes.
 AMBILUX_HD void add_rgb(float* sum, Rgb value) {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900

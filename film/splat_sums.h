@@ -1,6 +1,8 @@
 // What light subpaths bring to the pixels.
 #pragma once
 
+#include <thread>
+
 #include "core/atomic.h"
 #include "core/lane.h"
 #include "core/math.h"
@@ -30,6 +32,33 @@ AMBILUX_HD bool gather_light([[maybe_unused]] SameKey same, [[maybe_unused]] Rgb
 #endif
 }
 
+/// While it lives, no other thread of a host adds to the cells of a row of pixels: one lock takes less time than atomic
+/// operations for three numbers of each cell. Nothing on a device.
+class SplatRow {
+public:
+    AMBILUX_HD explicit SplatRow([[maybe_unused]] uint32_t row) {
+#if !defined(__CUDA_ARCH__)
+        lock_ = &locks_[row % kLocks].flag;
+        while (lock_->test_and_set(std::memory_order_acquire)) std::this_thread::yield();
+#endif
+    }
+    AMBILUX_HD ~SplatRow() {
+#if !defined(__CUDA_ARCH__)
+        lock_->clear(std::memory_order_release);
+#endif
+    }
+    SplatRow(const SplatRow&) = delete;
+    SplatRow& operator=(const SplatRow&) = delete;
+
+private:
+    struct alignas(64) Lock {
+        std::atomic_flag flag;
+    };
+    static constexpr uint32_t kLocks = 128;
+    static inline Lock locks_[kLocks];
+    std::atomic_flag* lock_ = nullptr;
+};
+
 /// A cell per pixel and sample of a wave, of one of two kinds. A sum of floats in doubles is exact, so that it does not
 /// depend on the order in which threads add, while the values of a cell lie within a factor of 2^28; beyond that its
 /// error is below 2^-52 of the sum. A cell of floats takes one operation of memory instead of three: n values are added
@@ -40,10 +69,11 @@ struct SplatSums {
     Lane* floats = nullptr;     ///< or a lane per cell
 
     AMBILUX_HD bool exists() const { return doubles || floats; }
-    /// `value`: finite, not negative. `alone`: few other threads of the warp, if any, add to the same cell.
+    /// `value`: finite, not negative. A host has locked the row, or nobody else adds. `alone`: few other threads of the
+    /// warp, if any, add to the same cell.
     AMBILUX_HD void add(uint64_t cell, Rgb value, bool alone) const {
         if (doubles) {
-            for (int c = 0; c < 3; ++c) add_shared(doubles + cell * 3 + c, double(value[c]));
+            for (int c = 0; c < 3; ++c) add_double(doubles + cell * 3 + c, double(value[c]));
             return;
         }
         if (!alone && !gather_light(same_key(reinterpret_cast<uintptr_t>(floats + cell)), value)) return;

@@ -74,22 +74,25 @@ struct LightVertexSearch {
     /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light subpath of the same
     /// slot, or, over a cache, the number of draws that are left.
     AMBILUX_HD uint32_t find(uint32_t& next) const {
-        const bool drawn = source.draws > 0;
+        const bool from_cache = source.from_cache();
         const uint32_t size = source.vertices.counter->size();
         if (size == 0 || depth + 2 > max_depth) next = kNone;
         while (next != kNone) {
             uint32_t light = next;
-            if (drawn)
-                light = drawn_vertex<typename NumbersOf<Mis>::Points>(key, depth, --next, size, source.coherent,
-                                                                      source.draws);
+            if (from_cache) light = drawn(--next, size);
             const ConnectionVertexFront y = source.vertices.items.load_front(light);
-            if (!drawn)
+            if (!from_cache)
                 next = y.link;
             else if (next == 0)
                 next = kNone;
             if (depth + y.bits.depth() + 1 <= max_depth && may_connect(y, z)) return light;
         }
         return kNone;
+    }
+
+    /// The light vertex of draw `i`.
+    AMBILUX_HD uint32_t drawn(uint32_t i, uint32_t size) const {
+        return drawn_vertex<typename NumbersOf<Mis>::Points>(key, depth, i, size, source.coherent, source.draws);
     }
 };
 

@@ -103,6 +103,7 @@ private:
         const bool alone = !same_key(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)).has_several_lanes();
         with_filter(scene, [&](auto filter) {
             for (int32_t py = y0; py <= y1; ++py) {
+                const SplatRow locked(py);
                 const float row = filter(y - (float(py) + 0.5f));
                 for (int32_t px = x0; px <= x1; ++px) {
                     const float weight = row * filter(x - (float(px) + 0.5f));

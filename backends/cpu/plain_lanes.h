@@ -1,6 +1,7 @@
 // Eye vertices of path in lanes: plain ones are gathered, computed side by side and pushed; others go one by one.
 #pragma once
 
+#include "backends/cpu/connection_lanes.h"
 #include "backends/cpu/executor.h"
 #include "backends/cpu/plain_vertices.h"
 #include "queues/counter.h"
@@ -20,6 +21,12 @@ struct PlainLanesOf<EyeVertex<F, UnidirectionalMis, EmissionOut, Clocked<NextEve
     static constexpr Features kFeatures = F;
     using Lanes =
         PlainLanes<EyeVertex<F, UnidirectionalMis, EmissionOut, Clocked<NextEvent<F, UnidirectionalMis, Out>>>>;
+};
+template <Features F, class EmissionOut, class Out>
+struct PlainLanesOf<
+    EyeVertex<F, BidirectionalMis, EmissionOut, NextEventAndConnections<F, Out, LightVertexSource<BidirectionalMis>>>> {
+    static constexpr bool kHas = F.has(BsdfType::diffuse);
+    using Lanes = ConnectedLanes<F, EmissionOut, Out>;
 };
 
 /// Runs `Stage` for items one after the other: add() them, and then run().

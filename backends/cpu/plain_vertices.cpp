@@ -1,19 +1,11 @@
-// GCC makes vectors of these loops because all that they call is inlined, early returns included, whose conditions it
-// joins. What it needs for that: the options in backends/CMakeLists.txt; a function around the body, whose locals are
-// not those of the loop; structs that are not const where parts of them are copied; no bool that is one of two bools.
 #include "backends/cpu/plain_vertices.h"
 
+#include "backends/cpu/lanes.h"
 #include "items/subpath_items.h"
 #include "queues/counter.h"
 #include "stages/subpath_numbers.h"
 #include "transport/subpath/next_event.h"
 #include "transport/subpath/scatter.h"
-
-#if defined(__x86_64__)
-#define AMBILUX_LANES __attribute__((flatten, target("avx512f,avx512dq,avx512bw,avx512vl,prefer-vector-width=512")))
-#else
-#define AMBILUX_LANES
-#endif
 
 namespace ambilux {
 
@@ -21,10 +13,6 @@ namespace {
 
 using Mis = UnidirectionalMis;
 
-constexpr Features kPlain = {bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle)};
-
-inline Vec3f vector_of(const Vec4f& v) { return {v.x, v.y, v.z}; }
-inline Vec4f with_word(const Vec3f& v, float word) { return {v.x, v.y, v.z, word}; }
 inline SubpathBits bits_of(const PlainVertices& b, uint32_t i) { return {float_bits(b.direction[i].w)}; }
 
 struct Corners {
@@ -181,12 +169,12 @@ AMBILUX_LANES void scatters(const Rules<Mis>& rules, PlainVertices& v, uint32_t 
 }  // namespace
 
 bool has_plain_lanes() {
-#if defined(__x86_64__)
-    static const bool has = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-                            __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    return has;
+#if defined(__clang__) || !defined(__x86_64__)
+    return false;  // Clang 14 makes vectors of one of these loops
+#elif defined(__AVX2__) && defined(__FMA__)
+    return !plain_lanes_off;
 #else
-    return false;
+    return !plain_lanes_off && __builtin_cpu_supports("x86-64-v4");
 #endif
 }
 

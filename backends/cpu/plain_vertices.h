@@ -1,4 +1,4 @@
-// Plain vertices of eye subpaths side by side, for processors with vectors of 16 floats: what a vertex computes,
+// Plain vertices of eye subpaths side by side, for processors with vectors of 16 or 8 floats: what a vertex computes,
 // between what is looked up for it and what it pushes (plain_lanes.h).
 #pragma once
 
@@ -38,8 +38,10 @@ struct alignas(64) PlainVertices {
     Row<Vec4f> next_throughput;  ///< and the sum
 };
 
-/// False if the processor lacks such vectors. The functions below are then not to be called.
+/// False if the compiler or the processor lacks such vectors: all goes one by one.
 bool has_plain_lanes();
+/// For tests.
+inline bool plain_lanes_off = false;
 
 /// Random numbers of the first `count` vertices; here and below a multiple of kWidth.
 void plain_numbers(const Wave& wave, PlainVertices& v, uint32_t count);
