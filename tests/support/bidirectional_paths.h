@@ -270,6 +270,10 @@ inline float reverse_pdf(const Scattering& s, Vec3f wo_world) {
 inline OracleMerges merges_of(const BidirectionalMis&) { return {}; }
 /// How eye subpaths sample directions.
 inline EyeDensity eye_density_of(const SceneView&, const BidirectionalMis&) { return {}; }
+/// Expected samples of each strategy of connections of a path.
+inline double connections_of(const BidirectionalMis& mis, const SceneView&, const OraclePath&) {
+    return double(mis.connections);
+}
 
 /// `Mis`: the model whose weights are compared. Merges have weights in sums only (sum_of_weights).
 template <class Mis>
@@ -441,7 +445,9 @@ private:
         Candidate<Mis> c;
         if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, c)) return;
         const Vec3f to_y = y.point.p - z.point.p;
-        compare(kConnect, a + 1, c, join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y)))));
+        const OraclePath p = join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y))));
+        if (mis_.has(kConnectionStrategies) && connections_of(mis_, scene_, p) == 0) return;  // there is no such sample
+        compare(kConnect, a + 1, c, p);
     }
 
     void splat(uint32_t a) {
@@ -469,7 +475,7 @@ private:
     void compare(Kind kind, uint32_t s, const Candidate<Mis>& c, const OraclePath& path, bool counts = true) {
         const OracleSteps steps = steps_of(path, false);
         const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_subpaths),
-                                                       double(mis_.connections), merges_of(mis_));
+                                                       connections_of(mis_, scene_, path), merges_of(mis_));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies
                               << " heuristic " << int(mis_.heuristic) << " emitter type "
                               << int(scene_.emitters[path.emitter].type) << " vertices " << describe(path));
@@ -665,7 +671,7 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     }
 
     const OracleStrategies all = oracle_strategies(scene_, path, steps_of(path, false), double(mis_.light_subpaths),
-                                                   double(mis_.connections), merges_of(mis_));
+                                                   connections_of(mis_, scene_, path), merges_of(mis_));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {
