@@ -1,8 +1,9 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // timeout: 600
-// Variant guided of path on a CUDA device: the image of the path tracer, and bits that depend on no size of waves.
+// Variants guided on a CUDA device: the image of the path tracer and, of path, bits that depend on no size of waves.
 #include "film/ztest.h"
+#include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 #include "tests/support/whole_iterations.h"
 
@@ -56,5 +57,25 @@ TEST_CASE("guided paths: CPU and CUDA agree, and with deterministic=true bits de
         }
         on_device.graph = false;
         check_same_bits(render_scene(scene, on_device, 16), one);
+    }
+}
+
+TEST_CASE("guided bdpt: CPU and CUDA agree with lvc, and training brings nothing to the image") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "glass", "materials", "door"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 48, 32);
+        RenderSettings s = guided(scene, 4), lvc = cpu_settings(scene, Estimator::mis, 5);
+        s.integrator = lvc.integrator = "bdpt";
+        lvc.variant = "lvc";
+        s.backend = lvc.backend = "cuda";
+        const Estimate image = render_batches(scene, s, 2048);
+        const ZTestResult z = z_test(image, render_batches(scene, lvc, 2048));
+        INFO(z.report());
+        CHECK(z.pass);
+        s.backend = "cpu";
+        const ZTestResult on_cpu = z_test(image, render_batches(scene, s, 512));
+        INFO(on_cpu.report());
+        CHECK(on_cpu.pass);
     }
 }

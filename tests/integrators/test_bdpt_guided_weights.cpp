@@ -63,7 +63,7 @@ TEST_CASE("Weights with guided eye subpaths equal those of all strategies enumer
     REQUIRE(trees.leaves() == 256);
     CHECK(trees.state.tree.leaves[7].quads > 5);
     const std::map<std::string, uint64_t> seen =
-        compare_weights(0.5, [&](uint32_t i) { return GuidedBidirectionalMis{settings(i), trees.state.tree}; });
+        compare_weights(1.0, [&](uint32_t i) { return GuidedBidirectionalMis{settings(i), trees.state.tree}; });
     for (const std::string kind : {"hit", "escape", "next event", "connection", "light tracing"}) {
         for (const char* sensor : {"perspective", "thinlens", "orthographic", "spherical"})
             CHECK(seen.at(kind + ", " + sensor) >= 20);
