@@ -64,7 +64,10 @@ struct NextEventAndConnections {
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
                        uint32_t slot, const NumbersOf<Mis>& numbers) const {
         if (rules.next_event) next_event.at(scene, rules, v, path, slot, numbers);
-        if (!rules.connect) return;
+        if (rules.connect) connect(scene, rules, v, path, slot, numbers);
+    }
+    AMBILUX_HD void connect(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v,
+                            const Subpath<Mis>& path, uint32_t slot, const NumbersOf<Mis>& numbers) const {
         const FusedClock clock(record, true);
         const auto lights = source.search(numbers.key, path.depth, v, rules.max_depth, source.link(v, slot));
         uint32_t next = source.first(slot), found = lights.find(next);

@@ -9,22 +9,31 @@
 
 namespace ambilux {
 
-/// NextEventAndConnections of a launch.
-template <Features F, class Out>
+/// Runs EyeVertex with NextEventAndConnections for items one after the other: add() them, and then run().
+template <Features F, class EmissionOut, class Out>
 class ConnectionLanes {
     using Mis = BidirectionalMis;
     using Source = LightVertexSource<Mis>;
-    using OneByOne = NextEventAndConnections<F, Out, Source>;
 
 public:
-    ConnectionLanes(const OneByOne& connect, const SceneView& scene, const Wave& wave, const Rules<Mis>& rules)
-        : connect_(connect), scene_(scene), wave_(wave), rules_(rules), on_(has_plain_lanes() && !rules.singles.on) {}
+    template <class Stage>
+    explicit ConnectionLanes(const Stage& s)
+        : connect_(s.vertices), rules_(s.rules), on_(has_plain_lanes() && !rules_.singles.on),
+          stage_{s.scene, s.wave, s.rules, s.hits, s.rays, s.emission, *this, s.record, s.camera_lane_known} {}
 
-    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot, const RandomNumbers& numbers) {
-        if (!on_ || !rules_.connect || !v.scattering.plain_diffuse())
-            return connect_.at(scene_, rules_, v, path, slot, numbers);
-        if (rules_.next_event) connect_.next_event.at(scene_, rules_, v, path, slot, numbers);
+    void add(uint32_t i) { stage_(i); }
+
+    /// What `stage_` does at a vertex.
+    void at(const SceneView& scene, const Rules<Mis>&, const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot,
+            const RandomNumbers& numbers) {
+        if (rules_.next_event) connect_.next_event.at(scene, rules_, v, path, slot, numbers);
+        if (!rules_.connect) return;
+        if (!on_ || !v.scattering.plain_diffuse()) return connect_.connect(scene, rules_, v, path, slot, numbers);
         const FusedClock clock(connect_.record, true);
+        const Source& source = connect_.source;
+        const uint32_t size = source.vertices.counter->size();
+        uint32_t next = size > 0 && path.depth + 2 <= rules_.max_depth ? source.first(slot) : kNone;
+        if (next == kNone) return;
         const Scattering& s = v.scattering;
         const Rgb throughput = path.throughput * s.bsdf.inputs.colors[0];
         const Vec4f eye[5] = {{v.point.p.x, v.point.p.y, v.point.p.z, bits_float(path.depth)},
@@ -32,10 +41,9 @@ public:
                               {s.frame.n.x, s.frame.n.y, s.frame.n.z, v.sums.dvcm},
                               {path.direction.x, path.direction.y, path.direction.z, 0.0f},
                               {throughput.x, throughput.y, throughput.z, v.sums.dvc}};
-        const Source& source = connect_.source;
         const auto lights = source.search(numbers.key, path.depth, v, rules_.max_depth, slot);
-        const uint32_t size = source.vertices.counter->size();
-        uint32_t next = size > 0 && path.depth + 2 <= rules_.max_depth ? source.first(slot) : kNone;
+        SubpathEnd<Mis> end;
+        bool has_end = false;
         while (next != kNone) {  // as LightVertexSearch::find, which tests the vertices at once
             const uint32_t place = source.from_cache() ? lights.drawn(--next, size) : next, k = count_;
             const ConnectionVertex<Mis> light = source.vertices.items.load(place, kLightRows);
@@ -53,9 +61,11 @@ public:
                 memcpy(rows, &light, sizeof(rows));
                 for (uint32_t row = 0; row < kLightRows; ++row) pairs_.light[row][k] = rows[row];
             } else if (path.depth + light.bits().depth() + 1 <= rules_.max_depth && may_connect(light.front, v)) {
+                if (!has_end) end = rounded_end<F>(scene, v, path);
+                has_end = true;
                 connect_.record->count_item(path.depth);
-                push_connection<F>(scene_, rules_, source, *connect_.state, numbers, rounded_end<F>(scene_, v, path),
-                                   slot, load_vertex<F>(source.vertices, place), place, connect_.next_event.inner.seeds,
+                push_connection<F>(scene, rules_, source, *connect_.state, numbers, end, slot,
+                                   load_vertex<F>(source.vertices, place), place, connect_.next_event.inner.seeds,
                                    Keep{one_by_one_[k]}, connect_.record);
             }
             if (++count_ == PlainPairs::kMost) run();
@@ -77,14 +87,13 @@ public:
                 connect_.next_event.inner.candidates.push(one_by_one_[k]);
             }
         }
-        connect_.record->count_items(found, wave_.state->depth);
+        connect_.record->count_items(found, connect_.state->depth);
         count_ = 0;
     }
 
 private:
     static constexpr uint32_t kLightRows = ConnectionVertex<Mis>::kDiffuseLanes;
 
-    /// Keeps what push_connection pushes.
     struct Keep {
         CandidateItem& item;
 
@@ -106,49 +115,20 @@ private:
         c.strategy = Strategy::make(light + 1, eye + 1);
         if (connect_.next_event.inner.seeds)
             c.opacity_seed =
-                eye_numbers(rules_.mis, wave_, slot_[k])
+                eye_numbers(rules_.mis, stage_.wave, slot_[k])
                     .shadow_seed(connection_ray(eye, connect_.source.from_cache() ? kMaxDepth + place_[k] : light));
         connect_.next_event.inner.candidates.push(c);
     }
 
-    const OneByOne& connect_;
-    const SceneView& scene_;
-    const Wave& wave_;
+    const NextEventAndConnections<F, Out, Source>& connect_;
     const Rules<Mis>& rules_;
     const bool on_;
+    EyeVertex<F, Mis, EmissionOut, ConnectionLanes&> stage_;
     uint32_t count_ = 0;
     uint32_t slot_[PlainPairs::kMost], place_[PlainPairs::kMost];
     bool plain_[PlainPairs::kMost];
     CandidateItem one_by_one_[PlainPairs::kMost];
     PlainPairs pairs_;
-};
-
-/// Eye vertices of bdpt, whose connections are computed in lanes.
-template <Features F, class EmissionOut, class Out>
-class ConnectedLanes {
-    using Mis = BidirectionalMis;
-    using Lanes = ConnectionLanes<F, Out>;
-    struct AtVertex {
-        Lanes* lanes;
-
-        void at(const SceneView&, const Rules<Mis>&, const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot,
-                const RandomNumbers& numbers) const {
-            lanes->at(v, path, slot, numbers);
-        }
-    };
-
-public:
-    template <class Stage>
-    explicit ConnectedLanes(const Stage& s)
-        : lanes_(s.vertices, s.scene, s.wave, s.rules),
-          stage_{s.scene, s.wave, s.rules, s.hits, s.rays, s.emission, {&lanes_}, s.record, s.camera_lane_known} {}
-
-    void add(uint32_t i) { stage_(i); }
-    void run() { lanes_.run(); }
-
-private:
-    Lanes lanes_;
-    EyeVertex<F, Mis, EmissionOut, AtVertex> stage_;
 };
 
 }  // namespace ambilux

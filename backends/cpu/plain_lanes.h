@@ -26,7 +26,7 @@ template <Features F, class EmissionOut, class Out>
 struct PlainLanesOf<
     EyeVertex<F, BidirectionalMis, EmissionOut, NextEventAndConnections<F, Out, LightVertexSource<BidirectionalMis>>>> {
     static constexpr bool kHas = F.has(BsdfType::diffuse);
-    using Lanes = ConnectedLanes<F, EmissionOut, Out>;
+    using Lanes = ConnectionLanes<F, EmissionOut, Out>;
 };
 
 /// Runs `Stage` for items one after the other: add() them, and then run().
