@@ -94,7 +94,8 @@ size_t bytes_to_save(const Scene& scene) {
 void write_images(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
                   const RenderStats& stats, const FilmMoments& film) {
     const Image image = mean_image(film);
-    write_exr(o.output, image, image_attributes(scene, settings, stats), make_aovs(scene, settings, film, o.aovs));
+    write_exr(o.output, image, image_attributes(scene, settings, stats),
+              make_aovs(scene, used_settings(settings, stats), film, o.aovs));
     if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
 }
 

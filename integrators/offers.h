@@ -33,6 +33,7 @@ struct SelectionOffer {
     uint32_t worth = 0;         ///< uniform draws that they are taken to be worth
     double work = 1.0;          ///< for that much more work of all kinds
     double least_subpaths = 0;  ///< eye subpaths of a render from which on it may be selected
+    bool by_pixel = false;      ///< the draws of each pixel follow from the other candidates' (render/by_pixel.h)
     bool measured = false;  ///< no pilot predicts it: a few samples are compared with those of the best of the others
 };
 

@@ -152,6 +152,14 @@ Setting light_picking() {
             "and this one");
 }
 
+Setting selector() {
+    return Setting(Of::choice("selector", &S::selector, {"image", "efficiency"},
+                              "what bdpt.auto=true chooses for: the whole image, or numbers of connections for each "
+                              "pixel too (efficiency-aware, Grittmann et al. 2022)"))
+        .where(has_strategies, "there is nothing to choose")
+        .only_with_auto();
+}
+
 Setting sampler() {
     return Setting(Of::choice("sampler", &S::sampler, {"independent", "sobol"},
                               "where the random numbers of subpaths come from: each by itself, or shuffled, "
@@ -204,6 +212,7 @@ std::vector<Setting> estimator_settings() {
             .where(has_strategies, "there is nothing to choose")
             .only_with_auto()
             .leaves_out(),
+        selector(),
         Is(Of::number("connections", &S::connections, 1u, kMaxCacheDraws, "light vertices that an eye vertex draws"))
             .where(draws_vertices, "no light vertices are drawn")
             .chosen_by_auto()

@@ -72,6 +72,12 @@ enum class Allow : uint32_t {
     consistent,  ///< and what is biased, but converges to the right image
 };
 
+/// What bdpt.auto=true chooses for.
+enum class Selector : uint32_t {
+    image,       ///< one candidate for all pixels
+    efficiency,  ///< and numbers of connections for each pixel (variant aware)
+};
+
 /// How next event estimation picks an emitter. Light subpaths begin by the scene's table in either case.
 enum class LightPicks : uint32_t {
     table,  ///< by the table of the scene, which was loaded by power or uniform, whatever the receiver
@@ -97,7 +103,8 @@ struct RenderSettings {
     uint32_t technique_depth = 0;          ///< segments up to which images of single strategies are gathered
     bool automatic = false;                ///< a pilot chooses strategies, variant and connections
     Allow allow = Allow::unbiased;         ///< from among what
-    uint32_t connections = 3;              ///< light vertices that an eye vertex draws
+    Selector selector = Selector::image;
+    uint32_t connections = 3;  ///< light vertices that an eye vertex draws
     CacheDraws draws = CacheDraws::automatic;
     uint32_t light_subpaths_per_tile = kTilePixels;  ///< per pixel in multiples of 1/kTilePixels
     int max_depth = -1;                              ///< segments of a path; -1 is unbounded
@@ -127,6 +134,13 @@ struct RenderSettings {
     /// What build=auto may do. Experiments leave it.
     bool may_build_fast = false;
 };
+
+/// What was to be chosen is: no setting of bdpt.auto is left.
+inline void end_selection(RenderSettings& settings) {
+    settings.automatic = false;
+    settings.allow = Allow::unbiased;
+    settings.selector = Selector::image;
+}
 
 /// Sets one setting from text; throws Error(usage) that names the key, the value and what is allowed.
 void apply_setting(RenderSettings& settings, const std::string& key, const std::string& value);

@@ -39,8 +39,7 @@ double median(std::vector<double> values) {
 
 RenderSettings settings_of(const RenderSettings& settings, const SelectionCandidate& candidate) {
     RenderSettings s = settings;
-    s.automatic = false;
-    s.allow = Allow::unbiased;
+    end_selection(s);
     for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
     if (!variant_of(s).traits.draws_together) s.draws = CacheDraws::automatic;  // others have no draws to be set
     return s;
@@ -56,6 +55,7 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
                 all.push_back(candidate_of(v, std::move(offer), light_paths));
         }
     std::stable_partition(all.begin(), all.end(), [](const SelectionCandidate& c) { return !c.offer.measured; });
+    std::stable_partition(all.begin(), all.end(), [](const SelectionCandidate& c) { return c.predicted(); });
     return all;
 }
 
@@ -72,13 +72,13 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
     if (c.connect) work += candidate.offer.draws * (draw * w.draws + ray * w.draw_rays);
     work *= candidate.offer.work;
-    const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
     // A light subpath for every vertex of an eye subpath.
-    if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
+    if (c.connect && c.draws == 0 && variant_of(settings_of({}, candidate)).traits.streams)
+        work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
     return bidirectional * work;
 }
 
-std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance) {
+std::vector<size_t> kept_blocks(const std::vector<std::vector<double>>& variance) {
     const size_t blocks = variance[0].size();
     std::vector<std::pair<double, size_t>> worst(blocks);
     for (size_t b = 0; b < blocks; ++b) {
@@ -87,23 +87,37 @@ std::vector<double> trimmed_means(const std::vector<std::vector<double>>& varian
     }
     std::sort(worst.begin(), worst.end());
     const size_t kept = blocks - size_t(kTrimmedBlocks * double(blocks));
+    std::vector<size_t> found;
+    for (size_t i = 0; i < kept; ++i) found.push_back(worst[i].second);
+    return found;
+}
+
+std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance) {
+    const std::vector<size_t> kept = kept_blocks(variance);
     std::vector<double> means;
     for (const std::vector<double>& of : variance) {
         double sum = 0;
-        for (size_t i = 0; i < kept; ++i) sum += of[worst[i].second];
-        means.push_back(std::max(sum / double(kept), 1e-12));
+        for (const size_t b : kept) sum += of[b];
+        means.push_back(std::max(sum / double(kept.size()), 1e-12));
     }
     return means;
 }
 
+double unseen_variance(const std::vector<double>& means) { return kUnseen * median(means); }
+
+std::vector<std::vector<double>> possible_variances(const Pilot& pilot, const std::vector<std::string>& excluded) {
+    std::vector<std::vector<double>> of;
+    for (size_t c = 0; c < pilot.variance.size(); ++c)
+        if (excluded[c].empty()) of.push_back(pilot.variance[c]);
+    return of;
+}
+
 std::vector<double> selection_variances(const Pilot& pilot, const std::vector<std::string>& excluded) {
     std::vector<double> variances(pilot.variance.size(), double(kInfinity));
-    std::vector<std::vector<double>> of;
-    for (size_t c = 0; c < variances.size(); ++c)
-        if (excluded[c].empty()) of.push_back(pilot.variance[c]);
+    const std::vector<std::vector<double>> of = possible_variances(pilot, excluded);
     if (of.empty()) return variances;
     const std::vector<double> means = trimmed_means(of);
-    const double unseen = kUnseen * median(means);
+    const double unseen = unseen_variance(means);
     for (size_t c = 0, i = 0; c < variances.size(); ++c)
         if (excluded[c].empty()) variances[c] = means[i++] + unseen;
     return variances;

@@ -14,6 +14,7 @@
 #include "core/seconds.h"
 #include "integrators/reachability.h"
 #include "integrators/registry.h"
+#include "render/by_pixel.h"
 #include "render/chosen.h"
 #include "render/head_start.h"
 #include "render/measured.h"
@@ -107,16 +108,16 @@ public:
             head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
         std::vector<PilotCandidate> predicted;
         for (const SelectionCandidate& c : candidates_)
-            if (!c.offer.measured) predicted.push_back(c.pilot);
-        const Pilot pilot =
-            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, pilot_samples(settings_, cuda_));
+            if (c.predicted()) predicted.push_back(c.pilot);
+        Pilot pilot = run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, pilot_samples(settings_, cuda_));
         if (head_start_) head_start_->stop();
         for (size_t c = 0; c < candidates_.size(); ++c)
             if (eye_subpaths(pilot) < candidates_[c].offer.least_subpaths)
                 excluded_[c] = "has too few samples to learn from";
+        for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
+        choose_by_pixel(pilot);
         variance_ = selection_variances(pilot, excluded_);
         variance_.resize(candidates_.size(), double(kInfinity));
-        for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
         cost_ = work_;
         rank();
         if (const std::optional<size_t> rival = doubtful_rival()) {
@@ -124,7 +125,8 @@ public:
             rank();
         }
         for (size_t c = predicted.size(); c < candidates_.size(); ++c)
-            if (excluded_[c].empty()) measure_beside(ranked_[0], c, pilot.expected_samples);
+            if (candidates_[c].offer.measured && excluded_[c].empty())
+                measure_beside(ranked_[0], c, pilot.expected_samples);
         try_out(worth_a_trial(pilot), pilot);
         rank();
 
@@ -142,6 +144,17 @@ private:
     double eye_subpaths(const Pilot& pilot) const { return pilot.expected_samples * pixels(); }
     double pixels() const { return double(scene_.sensor.crop_width) * scene_.sensor.crop_height; }
     double score(size_t c) const { return variance_[c] * cost_[c]; }
+
+    /// Candidates with a number of connections for each pixel.
+    void choose_by_pixel(Pilot& pilot) {
+        const std::vector<std::vector<double>> of = possible_variances(pilot, excluded_);
+        const double unseen = of.empty() ? 0.0 : unseen_variance(trimmed_means(of));
+        for (size_t c = 0; c < candidates_.size(); ++c) {
+            if (!candidates_[c].offer.by_pixel) continue;
+            work_[c] = set_connections_map(candidates_[c], candidates_, excluded_, cuda_, unseen, pilot);
+            if (work_[c] == 0.0) excluded_[c] = "has no pixels that differ";
+        }
+    }
 
     void rank() {
         ranked_.resize(candidates_.size());
@@ -306,7 +319,7 @@ private:
     const bool cuda_;
     const MakeRenderer& make_;
     const Clock::time_point start_ = Clock::now();
-    const std::vector<SelectionCandidate> candidates_;
+    std::vector<SelectionCandidate> candidates_;
     std::optional<HeadStart> head_start_;
     // By candidate.
     std::vector<std::string> excluded_;  ///< why; empty if it is not

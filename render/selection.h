@@ -15,6 +15,8 @@ struct SelectionCandidate {
     PilotCandidate pilot;  ///< with the uniform draws that those of the offer are taken to be worth
     SettingTexts settings;
     SelectionOffer offer;
+
+    bool predicted() const { return !offer.measured && !offer.by_pixel; }
 };
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
 /// `settings` with those of a candidate, and no longer automatic.
@@ -23,10 +25,16 @@ RenderSettings settings_of(const RenderSettings& settings, const SelectionCandid
 /// The rays and connections of one sample of a pixel, in multiples of one ray of a path tracer.
 double selection_work(const PilotWork& work, const SelectionCandidate& candidate, bool cuda);
 
-/// Mean over the blocks of a film of each candidate's variance, `variance[candidate][block]`, but for the hundredth of
-/// the blocks that is worst for the best candidate of each: what lies in a few pixels is not trimmed away by chance for
-/// some candidates only.
+/// The blocks of a film but for the hundredth that is worst for the best candidate of each, `variance[candidate]
+/// [block]`: what lies in a few pixels is not trimmed away by chance for some candidates only.
+std::vector<size_t> kept_blocks(const std::vector<std::vector<double>>& variance);
+/// Mean over these of each candidate's variance.
 std::vector<double> trimmed_means(const std::vector<std::vector<double>>& variance);
+
+/// What no pilot sees, from the means of all candidates.
+double unseen_variance(const std::vector<double>& means);
+/// Those of candidates that are not excluded.
+std::vector<std::vector<double>> possible_variances(const Pilot& pilot, const std::vector<std::string>& excluded);
 
 /// The variance of one sample that each candidate is selected by: the trimmed mean, and what no pilot sees, which is
 /// the same for all per eye subpath. `excluded[candidate]`: why it cannot be chosen, or empty. What such a candidate

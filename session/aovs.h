@@ -14,7 +14,7 @@ namespace ambilux {
 /// Camera paths of a pixel that layers of surfaces are made from, or all of a render that has fewer.
 constexpr uint32_t kAovSamples = 64;
 
-/// Those of surfaces (render/aov.h) and, of the render itself, `samples` and `variance`.
+/// Those of surfaces (render/aov.h) and, of the render itself, `samples`, `variance` and `connections`.
 std::vector<std::string> known_aovs();
 
 /// Throws Error(usage) that names a layer which is not known or asked for twice. `prefix` stands before "aov".
@@ -22,7 +22,7 @@ void check_aovs(const std::vector<std::string>& names, const std::string& prefix
 /// Throws Error(usage) for a layer that a render with these settings cannot have.
 void check_aovs_of(const RenderSettings& settings, const std::vector<std::string>& names, const std::string& prefix);
 
-/// The layers of these names, in their order. variance: of a pixel's mean.
+/// The layers of these names, in their order, with the settings that a render used. variance: of a pixel's mean.
 std::vector<Layer> make_aovs(const Scene& scene, const RenderSettings& settings, const FilmMoments& film,
                              const std::vector<std::string>& names);
 

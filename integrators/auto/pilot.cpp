@@ -101,15 +101,10 @@ public:
         std::vector<PilotSums> pixels(size_t(count) * pixels_);
         std::vector<PilotWork> work(count);
         parallel_for(count, [&](uint32_t b) { eye_block(b, &pixels[size_t(b) * pixels_], work[b]); });
-        for (const PilotWork& w : work) {
-            PilotWork& all = result_.work;
-            all.eye_rays += w.eye_rays / n;
-            all.next_events += w.next_events / n;
-            all.vertices += w.vertices / n;
-            all.pairs += w.pairs / n;
-            all.pair_rays += w.pair_rays / n;
-            all.draws += w.draws / n;
-            all.draw_rays += w.draw_rays / n;
+        result_.block_work.assign(count, result_.work);  // of light subpaths, so far
+        for (uint32_t b = 0; b < count; ++b) {
+            result_.work.add_eye(work[b], 1.0 / n);
+            result_.block_work[b].add_eye(work[b], count / n);
         }
         result_.light_vertices = double(vertices_.size()) / n;
         const uint64_t film = uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height;
@@ -363,6 +358,16 @@ private:
 };
 
 }  // namespace
+
+void PilotWork::add_eye(const PilotWork& w, double share) {
+    eye_rays += w.eye_rays * share;
+    next_events += w.next_events * share;
+    vertices += w.vertices * share;
+    pairs += w.pairs * share;
+    pair_rays += w.pair_rays * share;
+    draws += w.draws * share;
+    draw_rays += w.draw_rays * share;
+}
 
 double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda) {
     constexpr double kFewest = 64, kUsual = 1000, kMost = 1e6;

@@ -26,6 +26,9 @@ struct PilotWork {
     double vertices = 0;                 ///< of an eye subpath that can be connected
     double pairs = 0, pair_rays = 0;     ///< of paired subpaths: connections tried, shadow rays
     double draws = 0, draw_rays = 0;     ///< of one draw at each eye vertex
+
+    /// What eye subpaths have, `share` times.
+    void add_eye(const PilotWork& w, double share);
 };
 
 /// About how many samples of every pixel the render will take: those asked for; those that a path tracer makes in the
@@ -44,6 +47,7 @@ struct Pilot {
     std::vector<std::vector<double>> variance;
     double light_vertices = 0;  ///< mean of a light subpath
     PilotWork work;
+    std::vector<PilotWork> block_work;  ///< of the eye subpaths of each block, with the light subpaths of the film
 };
 
 /// About `samples` eye subpaths, and as many light subpaths, over the whole film. The numbers are those of

@@ -84,7 +84,7 @@ def render(scene: Scene | str | os.PathLike[str], integrator: str | None = None,
     With device="cuda" the image is on the device as well, as `image.on_device`. `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
     after the sample per pixel in work. Raises UsageError for values that are not allowed, DeviceError where the device or its memory fails.
 
-    `aovs` names layers, which become `image.aovs`: albedo, normal, depth, position, samples, variance (docs/aovs.md). With `technique_images` there are images of
+    `aovs` names layers, which become `image.aovs`: albedo, normal, depth, position, samples, variance, connections (docs/aovs.md). With `technique_images` there are images of
     all strategies in `image.strategies`, and as files in the folder of that name, if it is one. `image.outliers` lists `outliers` pixels, by the largest
     difference between one sample and the mean of their others.
 

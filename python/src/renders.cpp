@@ -123,8 +123,9 @@ public:
     }
     std::vector<Layer> layers() {
         std::vector<Layer> layers;
-        run_unlocked(
-            [&](const volatile bool*) { layers = make_aovs(scene_->scene, settings_, renderer_->film(), aovs_); });
+        run_unlocked([&](const volatile bool*) {
+            layers = make_aovs(scene_->scene, used_settings(settings_, renderer_->stats()), renderer_->film(), aovs_);
+        });
         return layers;
     }
     std::string outliers(uint32_t count) const {

@@ -101,7 +101,7 @@ private:
             selection_ = make_renderer(scene_, probe, accels)->stats().selection;
             earlier_seconds_ += selection_.seconds;
         }
-        settings_.automatic = false;
+        end_selection(settings_);
         for (const auto& [key, value] : selection_.settings) apply_setting(settings_, key, value);
         settings_.expected_samples = ranges_.size;  // each range by itself
     }

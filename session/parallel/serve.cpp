@@ -59,7 +59,7 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
     if (setup.text.at("scene_hash") != scene_hash(scene))
         throw Error(ExitCode::bad_input, "the scene is not that of the first rank: its files differ");
     RenderSettings settings = request.settings;
-    settings.automatic = false;
+    end_selection(settings);
     settings.expected_samples = setup.text.at("expected_samples");
     for (const auto& [key, value] : setup.text.at("selection").get<std::vector<std::pair<std::string, std::string>>>())
         apply_setting(settings, key, value);
