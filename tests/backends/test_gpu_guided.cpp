@@ -67,6 +67,7 @@ TEST_CASE("guided bdpt: CPU and CUDA agree with lvc, and training brings nothing
         const Scene scene = project_scene(name, 48, 32);
         RenderSettings s = guided(scene, 4), lvc = cpu_settings(scene, Estimator::mis, 5);
         s.integrator = lvc.integrator = "bdpt";
+        s.deterministic = false;
         lvc.variant = "lvc";
         s.backend = lvc.backend = "cuda";
         const Estimate image = render_batches(scene, s, 2048);

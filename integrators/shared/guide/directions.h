@@ -32,6 +32,10 @@ AMBILUX_HD bool is_narrow(const Bsdf& b) {
     });
 }
 
+/// luminance() with the same rounding in every copy of the code: a kernel has several for what a warp holds, in
+/// which a compiler may join other pairs of products and sums, and bits of a render must not depend on that.
+AMBILUX_HD float recorded_luminance(Rgb c) { return dot(c, {0.212671f, 0.715160f, 0.072169f}); }
+
 /// What a subpath knows of the guide, beside the sums of a model of weights.
 template <class Base>
 struct GuidedSums : Base {
@@ -83,8 +87,8 @@ struct GuidedDirections {
         if constexpr (Mis::kBidirectional)
             if (path.delta && !narrow) path.sums.dvc *= side == Side::eye ? 1.0f / leaf.bsdf_share : leaf.bsdf_share;
         if (side == Side::light) return;
-        path.sums.before = luminance(before);
-        path.sums.whole = luminance(path.throughput);
+        path.sums.before = recorded_luminance(before);
+        path.sums.whole = recorded_luminance(path.throughput);
         // Nothing was recorded of what follows a narrow lobe: no reason to end there.
         if (roulette)
             path.roulette_scale = scale_for_roulette(
@@ -102,7 +106,7 @@ private:
     template <Features F, class Mis>
     AMBILUX_HD float mixture(const Vertex<Mis>& v, Vec3f d, float pdf_sa) const {
         const float share = bsdf_share<F>(v);
-        return share < 1.0f ? share * pdf_sa + (1.0f - share) * tree.pdf_sa(v.sums.leaf, d) : pdf_sa;
+        return share < 1.0f ? fmaf(share, pdf_sa, (1.0f - share) * tree.pdf_sa(v.sums.leaf, d)) : pdf_sa;
     }
     /// From the BSDF with probability `share`, else from the quadtree of the leaf, in which either looks once.
     template <Features F, class Mis>
@@ -115,12 +119,12 @@ private:
         const Vec2f place = guided ? Vec2f{u.y, u.z} : square_of_direction(s.wo);
         const GuideQuads::Cell cell = tree.quads.descend(v.sums.leaf, place, guided);
         const float guide_sa = (1.0f - share) * kInv4Pi * cell.density;
-        if (!guided) return weigh(s, share * s.pdf_sa + guide_sa);
+        if (!guided) return weigh(s, fmaf(share, s.pdf_sa, guide_sa));
         const Vec3f wo = square_to_sphere(cell.at);
         if (!may_scatter(v.scattering, wo)) return false;
         BsdfValue f = BsdfDirections::evaluate<F>(v, wo, mode);
         if (is_zero(f.value)) return false;
-        f.pdf_sa = share * f.pdf_sa + guide_sa;
+        f.pdf_sa = fmaf(share, f.pdf_sa, guide_sa);
         return smooth_sample(wo, f, 1.0f, 0, s);
     }
     AMBILUX_HD static bool weigh(BsdfSample& s, float pdf) {
