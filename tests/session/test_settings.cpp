@@ -33,9 +33,9 @@ std::string refusal(const std::function<void()>& f) {
 std::string another(const Setting& s) {
     const std::string standard = s.default_text();
     for (const char* value :
-         {"true",       "false", "light",     "lvc",  "cpu",    "nee",  "power",  "hits",   "coherent",
-          "cwbvh",      "tree",  "sobol",     "good", "moment", "none", "select", "double", "pinned",
-          "consistent", "world", "densities", "0.25", "2",      "1",    "16"}) {
+         {"true",       "false", "light",     "lvc",        "cpu",    "nee",  "power",  "hits",   "coherent",
+          "cwbvh",      "tree",  "sobol",     "good",       "moment", "none", "select", "double", "pinned",
+          "consistent", "world", "densities", "efficiency", "2x1:12", "0.25", "2",      "1",      "16"}) {
         RenderSettings settings;
         try {
             s.what.set(settings, value);
@@ -147,10 +147,11 @@ TEST_CASE("stress has the methods that variants name, each once") {
     for (const Variant& v : variants())
         for (const Stressed& s : v.stress)
             if (!v.outside) names.push_back(s.name);
-    CHECK(names == std::vector<std::string>{"path-naive", "path-nee", "path-mis", "path-mis-power", "path-ris",
-                                            "path-guided", "path-optimal", "light", "light-power", "bdpt", "bdpt-power",
-                                            "lvc", "lvc-power", "streaming", "streaming-power", "megakernel",
-                                            "megakernel-power", "vcm"});
+    CHECK(names == std::vector<std::string>{"path-naive",      "path-nee",    "path-mis",         "path-mis-power",
+                                            "path-ris",        "path-guided", "path-optimal",     "light",
+                                            "light-power",     "bdpt",        "bdpt-power",       "lvc",
+                                            "lvc-power",       "aware",       "bdpt-guided",      "streaming",
+                                            "streaming-power", "megakernel",  "megakernel-power", "vcm"});
 }
 
 TEST_CASE("learned draws are offered to the selection as four that are worth twelve, where they may be") {

@@ -27,8 +27,8 @@ std::vector<Declaration<GuidedSettings>> GuidedVariant::settings() {
             "guide_split", &GuidedSettings::split, 16u, 1u << 24,
             "records that brought light to a leaf above which it splits in the first round of training; in round "
             "k sqrt(2^k) times as many"),
-        Of::number("guide_leaves", &GuidedSettings::most_leaves, 1u, 1u << 16,
-                   "leaves of the tree over space, at most, of 13 KiB each"),
+        Of::number("guide_leaves", &GuidedSettings::most_leaves, 0u, 1u << 16,
+                   "leaves of the tree over space, at most, of 13 KiB each; 0: 8192, of bdpt 4096"),
         Of::number("guide_samples", &GuidedSettings::iteration_samples, 0u, 1024u,
                    "samples of every pixel in one iteration; training before the first takes up to twice as many. 0: "
                    "by the size of the film, so that a device has eight million paths in one, a CPU 250 thousand, but "
