@@ -18,6 +18,7 @@ struct Trees {
     StageRecord record{};
 
     explicit Trees(const GuidedSettings& settings) : policy{settings, {0, 4}} {
+        if (policy.guided.most_leaves == 0) policy.guided.most_leaves = 8192;
         Layout dry;
         const StateSize size = {0, host_primitive_bytes()};
         GuidedState::lay_out(dry, policy, size);
