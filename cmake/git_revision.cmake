@@ -1,6 +1,10 @@
-# Script (cmake -P): writes OUTPUT from TEMPLATE with the git revision of SOURCE. Without git or outside a checkout it is "unknown".
+# Script (cmake -P): writes OUTPUT from TEMPLATE with the git revision of SOURCE. Without git or outside a checkout it is what a file
+# REVISION in SOURCE says, or "unknown".
 # Runs at every build, so that the revision in a result is that of the program that made it; an unchanged file is not touched.
 set(AMBILUX_REVISION "unknown")
+if(EXISTS ${SOURCE}/REVISION)
+  file(STRINGS ${SOURCE}/REVISION AMBILUX_REVISION LIMIT_COUNT 1)
+endif()
 find_program(GIT_PROGRAM git)
 if(GIT_PROGRAM)
   # Only this project's own repository counts: a source archive unpacked inside some other checkout has no revision.

@@ -38,7 +38,9 @@ std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make)
     if constexpr (F == kAllFeatures)
         if (settings.fuse == Fuse::none) {
             if constexpr (kLeftOut)
-                throw Error(ExitCode::usage, "fuse=none: this build has no such kernels; set AMBILUX_CUDA_OPTIMISE=ON");
+                throw Error(ExitCode::usage,
+                            "fuse=none: this build has no such kernels, as wheels and those with "
+                            "AMBILUX_CUDA_OPTIMISE=OFF; scripts/build.sh makes one that has");
             else
                 return make.template operator()<kNoFusion>();
         }

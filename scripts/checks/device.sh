@@ -28,7 +28,7 @@ run() {
 }
 
 methods=(path "path --variant ris" "path --variant guided" "path --variant optimal" "path --set sampler=sobol" "path --set light_picking=tree" light bdpt
-  "bdpt --variant lvc" "bdpt --variant learned" "bdpt --variant streaming" "bdpt --variant megakernel" vcm "vcm --variant correlated" sppm vpl)
+  "bdpt --variant lvc" "bdpt --variant aware" "bdpt --variant learned" "bdpt --variant guided" "bdpt --variant streaming" "bdpt --variant megakernel" vcm "vcm --variant correlated" sppm vpl)
 if [[ $parts == *' tests '* ]]; then
   # Those that measure free memory come last, alone as all.
   for test in $(find "$build/tests" -maxdepth 1 -name 'test_gpu_*' -type f -perm -u+x | sed 's#.*/##' | sort |

@@ -56,7 +56,7 @@ struct GuidedState {
     GuideProgress* progress;
     int64_t* sums;   ///< [leaf][node][quadrant]: what was recorded, in integers, so that any order adds up to the same
     int64_t* found;  ///< [leaf][node][quadrant]: how many records brought something
-    int64_t* records;    ///< [leaf]: of an update: how many brought something
+    int64_t* records;    ///< [leaf]: of an update: how many brought something; of a new leaf: what it was a part of
     int64_t* shares;     ///< [leaf][share of GuideShares]: second moments
     int64_t* reflected;  ///< [leaf][count, sum] of what scattered rays brought
     int64_t* tiles;      ///< [tile][count, sum]: samples of its pixels

@@ -9,6 +9,7 @@ namespace ambilux {
 /// iteration (kGuideRounds).
 struct GuideStep {
     static constexpr const char* kName = "guide_update";
+    static constexpr int64_t kNoLeaf = -1;  ///< of GuidedState::records
 
     GuidedState state;
     GuidedSettings settings;
@@ -173,7 +174,11 @@ struct CountSplits : GuideStep {
     AMBILUX_HD void operator()(uint32_t leaf) const {
         state.splits[leaf] = 0;
         const GuideProgress& p = progress();
-        if (!p.updating || leaf >= p.leaves || p.leaves == state.most_leaves) return;
+        if (!p.updating || p.leaves == state.most_leaves) return;
+        if (leaf >= p.leaves) {
+            state.records[leaf] = kNoLeaf;
+            return;
+        }
         const float most = max(float(settings.split) * sqrtf(float(1u << min(p.updates, 30u))),
                                2.0f * float(p.found) / float(state.most_leaves - p.leaves));
         float records = float(state.records[leaf]);
@@ -184,7 +189,7 @@ struct CountSplits : GuideStep {
     }
 };
 
-/// Leaves that have room split: their halves have the quadtree of the whole. New nodes lie in the order of leaves.
+/// Leaves that have room split. New nodes lie in the order of leaves.
 struct SplitLeaves : GuideStep {
     AMBILUX_HD void operator()(uint32_t leaf) const {
         const uint32_t more = state.splits[leaf], first = progress().leaves + state.places[leaf];
@@ -199,7 +204,7 @@ struct SplitLeaves : GuideStep {
             tree().leaves[id] = whole;
             tree().leaves[id].node = node;
             tree().leaves[id].depth = uint16_t(whole.depth + log2_of(more + 1));
-            if (k > 0) copy_quads(leaf, id, whole.quads);
+            if (k > 0) state.records[id] = leaf;
         }
     }
 
@@ -209,10 +214,15 @@ private:
         while (power >>= 1) ++n;
         return n;
     }
-    AMBILUX_HD void copy_quads(uint32_t from, uint32_t to, uint32_t nodes) const {
+};
+
+/// New leaves have the quadtree of the leaf that they were a part of.
+struct CopyQuads : GuideStep {
+    AMBILUX_HD void operator()(uint32_t leaf) const {
+        if (!progress().updating || leaf < progress().leaves || state.records[leaf] == kNoLeaf) return;
         const GuideQuads& q = tree().quads;
-        for (uint32_t n = 0; n < nodes; ++n)
-            q.nodes[to * GuideQuads::kNodes + n] = q.nodes[from * GuideQuads::kNodes + n];
+        const uint32_t from = uint32_t(state.records[leaf]) * GuideQuads::kNodes, to = leaf * GuideQuads::kNodes;
+        for (uint32_t n = 0; n < tree().leaves[leaf].quads; ++n) q.nodes[to + n] = q.nodes[from + n];
     }
 };
 
@@ -272,11 +282,14 @@ struct GuideUpdate {
     RefineQuads refine;
     CountSplits count;
     SplitLeaves split;
+    CopyQuads copy;
     FillGrid grid;
     UpdateTiles tiles;
     EndUpdate end;
 
-    static GuideUpdate of(const GuideStep& step) { return {{step}, {step}, {step}, {step}, {step}, {step}, {step}}; }
+    static GuideUpdate of(const GuideStep& step) {
+        return {{step}, {step}, {step}, {step}, {step}, {step}, {step}, {step}};
+    }
     template <class Executor>
     void run(Executor& exec) const {
         const GuidedState& s = begin.state;
@@ -285,6 +298,7 @@ struct GuideUpdate {
         exec.for_each(count, s.most_leaves);
         exec.scan(s.scan, s.splits, s.places, s.most_leaves, begin.record);
         exec.for_each(split, s.most_leaves);
+        exec.for_each(copy, s.most_leaves);
         exec.for_each(grid, GuideTree::kGridCells);
         exec.for_each(tiles, s.tile_count);
         exec.for_each(end, 1);

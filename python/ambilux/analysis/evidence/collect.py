@@ -211,6 +211,6 @@ def collect(place, stage, root, pictures):
     else:
         files = [file for file in sorted(place.folder(stage).glob("*.json")) if file.name != "stage.json"]
         order = {part["file"]: i for i, part in enumerate(stage.parts(place))}
-        found = sorted(((order[f.name], json.loads(f.read_text())) for f in files if f.name in order), key=lambda x: x[0])
-        made = stage.tables([result for _, result in found])
+        # Parts of scenes that are not on this machine have no place in `order`.
+        made = stage.tables([json.loads(f.read_text()) for f in sorted(files, key=lambda f: order.get(f.name, len(order)))])
     return {"source": source(place, stage, status, root), "blocks": made}
