@@ -96,6 +96,8 @@ def picture(outcome, folder):
 
 def stored(outcome, images):
     """What the page needs of an outcome, as evidence/data.py keeps it; draws its picture into the folder `images`."""
+    if outcome.status["state"] == "not run":
+        return not_run(outcome.claim)
     columns, rows = table(outcome)
     return {"says": outcome.verdict, "verdict": verdict_text(outcome), "why": outcome.why, "full": outcome.evidence, "columns": columns,
             "rows": rows, "left_out": list(outcome.left_out), "picture": picture(outcome, images) or "", "facts": list(facts(outcome))}
