@@ -60,9 +60,4 @@ Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint3
     return {variance_by_block(film), of_sample, double(film.samples)};
 }
 
-double variance_ratio(const Measured& a, const Measured& b) {
-    const std::vector<double> variance = trimmed_means({a.variance, b.variance});
-    return variance[1] / variance[0];
-}
-
 }  // namespace ambilux

@@ -18,7 +18,4 @@ struct Measured {
 /// counts for no time.
 Measured measure(const RenderSettings& settings, const MakeRenderer& make, uint32_t first, double seconds);
 
-/// Variance of b over that of a; the worst blocks are left out (trimmed_means).
-double variance_ratio(const Measured& a, const Measured& b);
-
 }  // namespace ambilux

@@ -255,14 +255,17 @@ private:
         }
     }
 
-    /// Scales what is known of the best to a candidate that was not predicted. Of samples behind those that are
-    /// expected: a radius that shrinks is smallest there, and variance greatest.
+    /// Scales what is known of the best to a candidate that was not predicted. Where a few samples show much less than
+    /// predicted, single hits bring the rest: merging finds such light at all times, so that its samples show all of
+    /// its variance. Of samples behind those that are expected: a radius that shrinks is smallest there, and variance
+    /// greatest.
     void measure_beside(size_t best, size_t other, double behind) {
         if (!excluded_[best].empty()) return void(variance_[other] = 1.0);
         const std::optional<Measured> a = measured(best, uint32_t(behind), 0),
                                       b = a ? measured(other, uint32_t(behind), 0) : a;
         if (!b) return void(excluded_[other] = "found no room to be measured");
-        variance_[other] = variance_[best] * variance_ratio(*a, *b);
+        const std::vector<double> seen = trimmed_means({a->variance, b->variance});
+        variance_[other] = seen[1] * (variance_[best] < kHidden * seen[0] ? variance_[best] / seen[0] : 1.0);
         cost_[other] = cost_[best] * b->seconds / a->seconds;
         seconds_[other] = b->seconds;
     }

@@ -575,6 +575,13 @@ TEST_CASE("allow=consistent: merging is compared with the best of the others, an
     const RenderResult seen = render_scene(pane, of_pane, 2);
     CHECK(seen.stats.selection.name == "vcm");
     CHECK(seen.stats.selection.candidates[0].excluded.find("cannot find paths") == 0);
+
+    // Light that others find by single hits: their few samples show none of it, and the pilot knows of it.
+    const Scene caustic = project_scene("mirror_caustic", 32, 32);
+    RenderSettings of_caustic = automatic_settings(caustic);
+    CHECK(render_scene(caustic, of_caustic, 2).stats.selection.name != "vcm");
+    apply_setting(of_caustic, "allow", "consistent");
+    CHECK(render_scene(caustic, of_caustic, 2).stats.selection.name == "vcm");
 }
 
 TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {

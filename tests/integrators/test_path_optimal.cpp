@@ -181,6 +181,23 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("Before a rare hit or a rare pick was seen least squares do not take what was seen for all that there is") {
+    constexpr double kRare = 1e-5;
+    const auto check = [](const Toy& toy, uint64_t seed, auto of) {
+        const std::vector<Lane> learned = toy.learned(OptimalLearning::least_squares, 200, seed);
+        const double balanced = toy.moments(nullptr, 20000, 3).second, lambda = of(learned);
+        CHECK(lambda * lambda * kRare < 0.01 * balanced);  // what the rare ones add to the variance
+    };
+    const auto at = [](const std::vector<Lane>& lanes, uint32_t k) { return double(start_of<Rgb>(lanes[k]).x); };
+    const EmitterStrategies seldom = {2, {0}, {float(1 - kRare), float(kRare)}};
+    for (uint64_t seed = 10; seed < 20; ++seed) {
+        for (const EmitterStrategies& all : {kOne, kTwo})
+            for (uint32_t k = 0; k < all.count; ++k)
+                check({all, kRare, of_none}, seed, [&](const auto& lanes) { return at(lanes, k); });
+        check({seldom, 0.8, of_none}, seed, [&](const auto& lanes) { return at(lanes, 1) - at(lanes, 0); });
+    }
+}
+
 TEST_CASE("The solution has less variance than its neighbours, and any weights have the same mean") {
     constexpr uint32_t kSamples = 400'000;
     for (const EmitterStrategies& all : {kOne, kTwo}) {

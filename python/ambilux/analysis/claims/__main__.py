@@ -47,7 +47,7 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m ambilux.analysis.claims", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("step", choices=["run", "page"])
-    parser.add_argument("--claims", type=Path, default=Path("experiments/claims"), help="folder of NAME.claim.toml")
+    parser.add_argument("--claims", type=Path, default=registry.PROJECT, help="folder of NAME.claim.toml")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these claims alone")
     parser.add_argument("--quick", action="store_true", help="experiments --reduced, into out/claims-quick")
     parser.add_argument("-o", "--output", type=Path, help="folder of the results (default: out/claims)")

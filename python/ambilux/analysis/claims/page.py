@@ -6,7 +6,7 @@ import re
 import matplotlib.pyplot as plt
 
 from ambilux.analysis import captions, comparison, style, tables
-from ambilux.analysis.claims import evaluate
+from ambilux.analysis.claims import evaluate, registry
 from ambilux.analysis.evidence import data
 
 HEAD = """# Published claims
@@ -19,14 +19,18 @@ the second over that of the first, *at equal samples* error of the second over t
 first over that of the second. Brackets are 95 % intervals, made as those of
 [analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
 
-- **reproduced** where the interval lies above 1 and, where the paper states a value, reaches this value,
+- **reproduced** where the interval lies above 1 (or what the column *published* says) and, where the paper states a
+  value, reaches this value,
 - **in part** where the interval lies above 1 and ends below the published value; of several comparisons, where some
   hold,
 - **not** where the interval lies below 1,
 - **undecided** where the interval holds 1, or where the data cannot support an interval.
 
-**A small run is no evidence.** It shows that the claim can be run; sizes, seeds and times are those of `--quick`.
+`scripts/claims.sh` repeats all of them, and `--quick` makes them small. **A small run is no evidence.** It shows that the
+claim can be run.
 """
+NOT_RUN = {"says": "not run", "verdict": "not run", "why": "there are no data of it yet", "full": False, "columns": [], "rows": [],
+           "left_out": [], "picture": "", "facts": []}
 SHOWN = {"at equal time": "equal time [95 %]", "at equal samples": "equal samples [95 %]", "of rates": "rates [95 %]"}
 KEPT = ("Scenes", "Seeds", "Device", "Revision")
 
@@ -96,15 +100,11 @@ def picture(outcome, folder):
 
 def stored(outcome, images):
     """What the page needs of an outcome, as evidence/data.py keeps it; draws its picture into the folder `images`."""
+    if outcome.status["state"] == "not run":
+        return NOT_RUN
     columns, rows = table(outcome)
     return {"says": outcome.verdict, "verdict": verdict_text(outcome), "why": outcome.why, "full": outcome.evidence, "columns": columns,
             "rows": rows, "left_out": list(outcome.left_out), "picture": picture(outcome, images) or "", "facts": list(facts(outcome))}
-
-
-def not_run(claim):
-    """Of a claim without data."""
-    return {"says": "not run", "verdict": "not run", "why": "there are no data of it yet", "full": False, "columns": [], "rows": [], "left_out": [],
-            "picture": "", "facts": [f"Command: `scripts/claims.sh --only {claim.name}`"]}
 
 
 def section(claim, found, images):
@@ -120,17 +120,19 @@ def section(claim, found, images):
     if found["picture"]:
         yield from [f"![{claim.title}: {claim.picture}]({images}/{found['picture']})", ""]
     yield from ["What differs from the paper:", "", *(f"- {d}" for d in claim.differs), ""]
-    yield from [f"How it {'was' if found['rows'] else 'is'} run:", "", *(f"- {f}" for f in found["facts"]), ""]
+    again = f"scripts/claims.sh --only {claim.name}" + ("" if claim.file.parent.parts[-2:] == registry.PROJECT.parts else f" --claims {claim.file.parent.name}")
+    facts = [*found["facts"], f"In one command: `{again}`"]
+    yield from [f"How it {'was' if found['rows'] else 'is'} run:", "", *(f"- {f}" for f in facts), ""]
 
 
 def markdown(claims, blocks, images, root, told=()):
     """The page, for a file in the folder `root`; pictures are in the folder `images`. blocks: {claim: stored()}. told: lines on where it was run."""
     folder, where = (os.path.relpath(path, root) for path in (claims[0].file.parent, images))
-    blocks = {c.name: blocks.get(c.name) or not_run(c) for c in claims}
+    blocks = {c.name: blocks.get(c.name, NOT_RUN) for c in claims}
     full = [blocks[c.name]["says"] for c in claims if blocks[c.name]["full"]]
     counts = f" Of these {evaluate.counted(full)}." if full else ""
     docs = os.path.normpath(os.path.relpath("docs", root) + "/x")[:-1]
-    lines = [HEAD.format(folder=f"[{os.path.basename(folder)}]({folder})", docs=docs),
+    lines = [HEAD.format(folder=f"[{claims[0].file.parent.resolve().name}]({folder})", docs=docs),
              f"{len(claims)} claims, {len(full)} run at full size.{counts}", *told, "",
              "| claim | paper | kind | verdict |", "| --- | --- | --- | --- |"]
     for claim in claims:

@@ -11,6 +11,7 @@ from pathlib import Path
 from ambilux.analysis.experiment import InputError, settings_of
 
 ENDING = ".claim.toml"
+PROJECT = Path("experiments/claims")
 MEASURES = ("at equal time", "at equal samples", "of rates")
 KINDS = [f"{form} {measure}" for form in ("ratio", "ranking") for measure in MEASURES]
 ERRORS = ("mse", "rmse")  # what a ratio of errors is of: the metric of the experiment, or the root of it

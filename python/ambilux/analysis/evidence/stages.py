@@ -44,7 +44,7 @@ STAGES = (
     Stage("peers_device", "peers.md", 560, experiment="experiments/peers_device.toml", kinds=PEERS, spread=CAUSTIC,
           figures=("convergence_time_relmse",)),
     Stage("auto", "performance.md", 480, experiment="experiments/auto.toml", kinds=("errors",), spread=CAUSTIC),
-    Stage("claims", "claims.md", 1100),
+    Stage("claims", "claims.md", 1300),
     Stage("switches_path", "performance.md", 160, experiment="experiments/switches_path.toml", kinds=("switches",)),
     Stage("switches_bdpt", "performance.md", 250, experiment="experiments/switches_bdpt.toml", kinds=("switches",)),
     Stage("frames", "performance.md", 60, parts=benches.frames, tables=benches.frames_tables),

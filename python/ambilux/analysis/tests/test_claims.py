@@ -134,7 +134,9 @@ def test_what_did_not_run_is_not_left_out(tmp_path):
     assert o.verdict == "not run" and "needs a device" in o.why and not o.evidence
     assert "failed: no memory" in outcome_of(tmp_path, state="failed", message="no memory").why
     (claim,) = registry.load(write_claim(tmp_path / "claims"))
-    assert evaluate.outcome(claim, tmp_path / "nothing").why == "nothing was run yet"
+    nothing = evaluate.outcome(claim, tmp_path / "nothing")
+    assert nothing.why == "nothing was run yet"
+    assert "How it is run:\n\n- In one command: `scripts/claims.sh --only c --claims claims`" in page_of(nothing, tmp_path, tmp_path)
     said = evaluate.counted([o.verdict, outcome_of(tmp_path).verdict])
     assert said == "2 claims: 1 reproduced, 0 in part, 0 not, 0 undecided, 1 not run"
 
