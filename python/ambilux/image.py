@@ -157,7 +157,10 @@ class Image:
 
 
 def pixels(value: Any) -> np.ndarray:
-    array = np.ascontiguousarray(value, dtype=np.float32)
+    given = np.asarray(value)
+    if given.dtype.kind != "f":
+        raise UsageError(f"an image holds floats, linear radiance, not {given.dtype}")
+    array = np.ascontiguousarray(given, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
         raise UsageError(f"an image has the shape (height, width, 3), not {array.shape}")
     return array
