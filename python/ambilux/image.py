@@ -147,6 +147,8 @@ class Image:
         name = os.fspath(path)
         os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
         if name.lower().endswith(".png"):
+            if not abs(exposure) <= 100:
+                raise UsageError(f"exposure {exposure}: 100 stops at most, up or down")
             _core.write_png(name, self.rgb, exposure)
         elif name.lower().endswith(".exr"):
             if stderr and self.stderr is None:
