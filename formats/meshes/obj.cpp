@@ -6,6 +6,7 @@
 #include "formats/file_budget.h"
 #include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
+#include "formats/meshes/polygons.h"
 
 namespace ambilux {
 
@@ -190,6 +191,8 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
     std::vector<uint32_t> polygon;
+    std::vector<Vec3d> places;  ///< of its corners
+    Triangles cut;              ///< of it
     bool some_normals = false, some_uvs = false, lacks_normals = false;
 
     for (; !in.text.done(); in.next_statement()) {
@@ -216,7 +219,13 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
                 lacks_normals |= corners[v].vn == kAbsent;
                 some_uvs |= corners[v].vt != kAbsent;
             }
-            for (size_t i = 2; i < polygon.size(); ++i) mesh.faces.push_back({polygon[0], polygon[i - 1], polygon[i]});
+            places.clear();
+            for (const uint32_t v : polygon) {
+                const std::array<double, 3>& p = in.positions[corners[v].v];
+                places.push_back({p[0], p[1], p[2]});
+            }
+            cut_polygon(places, cut);
+            for (const auto& t : cut) mesh.faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
             budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
         } else {
             leave_out(in, keyword);

@@ -9,6 +9,7 @@
 #include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/ply_blocks.h"
+#include "formats/meshes/polygons.h"
 
 namespace ambilux {
 
@@ -77,6 +78,9 @@ struct MeshBuilder {
     std::string unused = {};
     std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
     std::vector<Vec2f> corner_uvs = {};              ///< of faces up to the last one that has some
+    std::vector<uint32_t> polygon = {};
+    std::vector<Vec3d> places = {};  ///< of its corners
+    Triangles cut = {};              ///< of it
 
     void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
@@ -281,26 +285,47 @@ private:
         }
     }
 
-    /// Of the fan of `corners` triangle corners that begins at face `first`.
-    void add_corner_uvs(size_t first, size_t corners, const std::vector<Vec2f>& uvs) {
-        if (uvs.empty() || corners < 3) return;
-        if (uvs.size() != corners)
-            in.fail("a face of " + std::to_string(corners) + " corners has texture coordinates of " +
+    /// A vertex that the file has later, or not at all, is nowhere.
+    Vec3d place(uint32_t v) const {
+        if (v < points.size()) return {points[v][0], points[v][1], points[v][2]};
+        return v < mesh.positions.size() ? in_double(mesh.positions[v]) : Vec3d{};
+    }
+
+    void add_polygon() {
+        places.clear();
+        for (const uint32_t v : polygon) places.push_back(place(v));
+        cut_polygon(places, cut);
+        for (const auto& t : cut) mesh.faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
+    }
+
+    /// The polygon of the fan from face `first` on.
+    void cut_fan(size_t first) {
+        polygon = {mesh.faces[first][0], mesh.faces[first][1]};
+        for (size_t i = first; i < mesh.faces.size(); ++i) polygon.push_back(mesh.faces[i][2]);
+        mesh.faces.resize(first);
+        add_polygon();
+    }
+
+    /// Of the corners of the last polygon, whose triangles begin at face `first`.
+    void add_corner_uvs(size_t first, const std::vector<Vec2f>& uvs) {
+        if (uvs.empty() || polygon.size() < 3) return;
+        if (uvs.size() != polygon.size())
+            in.fail("a face of " + std::to_string(polygon.size()) + " corners has texture coordinates of " +
                     std::to_string(uvs.size()));
         corner_uvs.resize(3 * first);
-        for (size_t k = 2; k < corners; ++k) corner_uvs.insert(corner_uvs.end(), {uvs[0], uvs[k - 1], uvs[k]});
+        for (const auto& t : cut) corner_uvs.insert(corner_uvs.end(), {uvs[t[0]], uvs[t[1]], uvs[t[2]]});
     }
 
     void read_faces(const Element& element) {
         budget.bytes(mesh_bytes(vertices, element.count));
         mesh.faces.reserve(element.count);
-        std::vector<uint32_t> polygon;
         std::vector<Vec2f> uvs;
         const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
         for (uint64_t i = 0; i < element.count; ++i) {
             if (layout.valid) {
-                const uint64_t read = read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
-                                                       std::min(kBlock, element.count - i), mesh.faces);
+                const uint64_t read =
+                    read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
+                                     std::min(kBlock, element.count - i), mesh.faces, [&](size_t at) { cut_fan(at); });
                 budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
                 budget.tick(read);
                 has_faces |= read > 0;
@@ -323,8 +348,8 @@ private:
                 }
             }
             thin_faces += polygon.size() < 3;
-            for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
-            add_corner_uvs(first, polygon.size(), uvs);
+            add_polygon();
+            add_corner_uvs(first, uvs);
             for (MeshAttribute& a : mesh.attributes)
                 if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
             budget.bytes(mesh_bytes(vertices + corner_uvs.size(), mesh.faces.size()));
