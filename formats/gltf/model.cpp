@@ -123,7 +123,8 @@ void read_model(Context& context, const std::string& path) {
     std::replace(error.begin(), error.end(), '\n', ' ');
     constexpr size_t kLongest = 300;  // an error may quote a whole buffer
     if (error.size() > kLongest) error = error.substr(0, kLongest) + " ...";
-    if (!read) context.fail("it is not valid glTF 2.0: " + (error.empty() ? "unknown reason" : error));
+    if (!read || !error.empty())
+        context.fail("it is not valid glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     if (!context.model.asset.version.starts_with("2"))
         context.fail("it is glTF " + context.model.asset.version + ", not 2.0");
     unpack_views(context);
