@@ -28,6 +28,7 @@ struct ObjReader {
     uint64_t names_no_uv = 0, names_no_normal = 0;  ///< the first line that names one before the file has any
 
     [[noreturn]] void fail(const std::string& message) const { throw input_error(path, text.line, message); }
+    Vec3d place(uint32_t v) const { return {positions[v][0], positions[v][1], positions[v][2]}; }
 
     /// A backslash at the end of a line stands for a blank, and '#' begins a comment.
     bool at_end() {
@@ -190,9 +191,8 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     CornerMap vertex_of;
     std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
-    std::vector<uint32_t> polygon;
-    std::vector<Vec3d> places;  ///< of its corners
-    Triangles cut;              ///< of it
+    PolygonCutter cutter;
+    std::vector<uint32_t>& polygon = cutter.polygon;
     bool some_normals = false, some_uvs = false, lacks_normals = false;
 
     for (; !in.text.done(); in.next_statement()) {
@@ -219,13 +219,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
                 lacks_normals |= corners[v].vn == kAbsent;
                 some_uvs |= corners[v].vt != kAbsent;
             }
-            places.clear();
-            for (const uint32_t v : polygon) {
-                const std::array<double, 3>& p = in.positions[corners[v].v];
-                places.push_back({p[0], p[1], p[2]});
-            }
-            cut_polygon(places, cut);
-            for (const auto& t : cut) mesh.faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
+            cutter.add_to(mesh.faces, [&](uint32_t v) { return in.place(corners[v].v); });
             budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
         } else {
             leave_out(in, keyword);

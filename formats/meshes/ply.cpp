@@ -78,9 +78,7 @@ struct MeshBuilder {
     std::string unused = {};
     std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
     std::vector<Vec2f> corner_uvs = {};              ///< of faces up to the last one that has some
-    std::vector<uint32_t> polygon = {};
-    std::vector<Vec3d> places = {};  ///< of its corners
-    Triangles cut = {};              ///< of it
+    PolygonCutter cutter = {};
 
     void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
@@ -285,60 +283,42 @@ private:
         }
     }
 
-    /// A vertex that the file has later, or not at all, is nowhere.
-    Vec3d place(uint32_t v) const {
-        if (v < points.size()) return {points[v][0], points[v][1], points[v][2]};
-        return v < mesh.positions.size() ? in_double(mesh.positions[v]) : Vec3d{};
-    }
-
-    void add_polygon() {
-        places.clear();
-        for (const uint32_t v : polygon) places.push_back(place(v));
-        cut_polygon(places, cut);
-        for (const auto& t : cut) mesh.faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
-    }
-
-    /// The polygon of the fan from face `first` on.
-    void cut_fan(size_t first) {
-        polygon = {mesh.faces[first][0], mesh.faces[first][1]};
-        for (size_t i = first; i < mesh.faces.size(); ++i) polygon.push_back(mesh.faces[i][2]);
-        mesh.faces.resize(first);
-        add_polygon();
-    }
-
-    /// Of the corners of the last polygon, whose triangles begin at face `first`.
-    void add_corner_uvs(size_t first, const std::vector<Vec2f>& uvs) {
-        if (uvs.empty() || polygon.size() < 3) return;
-        if (uvs.size() != polygon.size())
-            in.fail("a face of " + std::to_string(polygon.size()) + " corners has texture coordinates of " +
+    void add_corner_uvs(size_t first, size_t corners, const std::vector<Vec2f>& uvs) {  // of the last polygon
+        if (uvs.empty() || corners < 3) return;
+        if (uvs.size() != corners)
+            in.fail("a face of " + std::to_string(corners) + " corners has texture coordinates of " +
                     std::to_string(uvs.size()));
         corner_uvs.resize(3 * first);
-        for (const auto& t : cut) corner_uvs.insert(corner_uvs.end(), {uvs[t[0]], uvs[t[1]], uvs[t[2]]});
+        for (const auto& t : cutter.triangles) corner_uvs.insert(corner_uvs.end(), {uvs[t[0]], uvs[t[1]], uvs[t[2]]});
     }
 
     void read_faces(const Element& element) {
         budget.bytes(mesh_bytes(vertices, element.count));
         mesh.faces.reserve(element.count);
         std::vector<Vec2f> uvs;
+        const auto place = [&](uint32_t v) {  // zero of what the file has later, or not at all
+            if (v >= points.size()) return v < mesh.positions.size() ? in_double(mesh.positions[v]) : Vec3d{};
+            return Vec3d{points[v][0], points[v][1], points[v][2]};
+        };
         const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
         for (uint64_t i = 0; i < element.count; ++i) {
             if (layout.valid) {
-                const uint64_t read =
-                    read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
-                                     std::min(kBlock, element.count - i), mesh.faces, [&](size_t at) { cut_fan(at); });
+                const uint64_t read = read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
+                                                       std::min(kBlock, element.count - i), mesh.faces,
+                                                       [&](size_t at) { cutter.cut_fan(mesh.faces, at, place); });
                 budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
                 budget.tick(read);
                 has_faces |= read > 0;
                 if ((i += read) == element.count) break;
             }
             const size_t first = mesh.faces.size();
-            polygon.clear();
+            cutter.polygon.clear();
             for (const Property& p : element.properties) {
                 if (p.role == Role::corners) {
                     has_faces = true;
                     uint32_t left = in.index(p.count_type);
                     budget.bytes(mesh_bytes(vertices, mesh.faces.size() + left));
-                    for (; left > 0; --left) polygon.push_back(in.index(p.type));
+                    for (; left > 0; --left) cutter.polygon.push_back(in.index(p.type));
                 } else if (p.role == Role::corner_uvs) {
                     read_corner_uvs(p, uvs);
                 } else if (p.list) {
@@ -347,9 +327,9 @@ private:
                     property_value(p, first);
                 }
             }
-            thin_faces += polygon.size() < 3;
-            add_polygon();
-            add_corner_uvs(first, uvs);
+            thin_faces += cutter.polygon.size() < 3;
+            cutter.add_to(mesh.faces, place);
+            add_corner_uvs(first, cutter.polygon.size(), uvs);
             for (MeshAttribute& a : mesh.attributes)
                 if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
             budget.bytes(mesh_bytes(vertices + corner_uvs.size(), mesh.faces.size()));
