@@ -328,6 +328,9 @@ TEST_CASE("files that lie are refused") {
     // tinygltf would leave out the whole material.
     CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1}; }),
                    "baseColorFactor"));
+    CHECK(contains(
+        changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = Json::object(); }),
+        "'index' property is missing"));
     // Images inside of buffers.
     for (const auto& [key, value, problem] :
          std::vector<std::tuple<std::string, Json, std::string>>{{"byteOffset", 4000000000u, "beyond the buffer"},
