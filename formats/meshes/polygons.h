@@ -19,12 +19,13 @@ void cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles);
 struct PolygonCutter {
     std::vector<uint32_t> polygon;  ///< vertices
     Triangles triangles;            ///< of its corners
+    std::vector<Vec3d> places;      ///< of its corners
 
     template <class Place>
     void add_to(Triangles& faces, const Place& place) {
-        places_.clear();
-        for (const uint32_t v : polygon) places_.push_back(place(v));
-        cut_polygon(places_, triangles);
+        places.clear();
+        for (const uint32_t v : polygon) places.push_back(place(v));
+        cut_polygon(places, triangles);
         for (const auto& t : triangles) faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
     }
     /// The polygon of the fan from face `first` to the last one.
@@ -35,9 +36,6 @@ struct PolygonCutter {
         faces.resize(first);
         add_to(faces, place);
     }
-
-private:
-    std::vector<Vec3d> places_;
 };
 
 }  // namespace ambilux
