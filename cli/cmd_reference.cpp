@@ -91,7 +91,7 @@ void add_reference(CLI::App& app, Run& run) {
     o->scene.add_to(command);
     o->render.add_to(command, true);
     command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();
-    command.add_option("--spp", o->spp, "Samples per pixel in total")->required()->check(refuse_negative);
+    command.add_option("--spp", o->spp, "Samples per pixel in total")->required();
     command.add_option("--png", o->png, "Write an sRGB PNG as well");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return reference(*o); }; });

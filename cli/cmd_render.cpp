@@ -332,7 +332,7 @@ void add_render(CLI::App& app, Run& run) {
             ->expected(0, 1)
             ->type_name("[FILE]");
     command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
-    command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's")->check(refuse_negative);
+    command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
     command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
     command
         .add_option(

@@ -67,9 +67,6 @@ struct LoadedScene {
 /// after it if one of them is a file of the scene.
 LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs = {});
 
-/// For options of 64-bit numbers, of which CLI11 takes -1 as the largest.
-std::string refuse_negative(const std::string& text);
-
 /// Throws Error(usage) if `path` ends like an image file of another format than `ending`, which is what is written.
 void check_image_name(const std::string& option, const std::string& path, const std::string& ending);
 

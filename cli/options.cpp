@@ -97,7 +97,7 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     command.add_option("--precision", precision, help_of("precision"))->capture_default_str();
     command.add_option("--memory", memory, help_of("memory"))->capture_default_str();
     command.add_option("--textures", textures, help_of("textures"))->capture_default_str();
-    command.add_option("--seed", seed, help_of("seed"))->check(refuse_negative)->capture_default_str();
+    command.add_option("--seed", seed, help_of("seed"))->capture_default_str();
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
     command.add_flag("--deterministic", deterministic, find_general_setting("deterministic")->what.help);
     command
@@ -124,8 +124,6 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
     }
     return s;
 }
-
-std::string refuse_negative(const std::string& text) { return text.starts_with("-") ? "it must not be negative" : ""; }
 
 void check_image_name(const std::string& option, const std::string& path, const std::string& ending) {
     if (path == "-")

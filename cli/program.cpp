@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <iostream>
 #include <new>
 
@@ -45,6 +46,26 @@ std::string wrong_use(const CLI::App* app, const CLI::Error& e) {
     return fmt::format("error: {}. See {} --help\n", what, path);
 }
 
+/// Reads integers as decimal ones of 64 bits: CLI11 takes 010 as eight, and -1 and 2^64 as the largest number.
+template <class T>
+std::string check_integer(std::string& text) {
+    T value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (std::is_unsigned_v<T> && text.starts_with("-")) return "it must not be negative";
+    if (error != std::errc() || end != text.data() + text.size())
+        return fmt::format("'{}' is no integer of this option", text);
+    text = std::to_string(value);
+    return "";
+}
+
+void check_integers(CLI::App& app) {
+    for (CLI::Option* option : app.get_options()) {
+        if (option->get_type_name() == "UINT") option->transform(CLI::Validator(check_integer<uint64_t>, ""));
+        if (option->get_type_name() == "INT") option->transform(CLI::Validator(check_integer<int64_t>, ""));
+    }
+    for (CLI::App* command : app.get_subcommands({})) check_integers(*command);
+}
+
 /// Each rank would do all of the work, and write the same files.
 void check_ranks(const std::string& command) {
     if (launched_ranks() == 1) return;
@@ -84,6 +105,7 @@ int run_program(int argc, const char* const* argv) {
     add_view(app, run);
     add_devices(app, run);
     add_help(app, run);
+    check_integers(app);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
         log_error(fmt::format("unknown command '{}': {} are known", argv[1], names_of(commands_of(app))));

@@ -20,7 +20,9 @@ bool ends_with(const std::string& path, std::string_view ending) {
 }  // namespace
 
 Scene load_scene_file(const std::string& path, const LoadOptions& options) {
-    if (std::filesystem::is_directory(path)) throw input_error(path, 0, "it is a folder: name the scene's file in it");
+    std::error_code ignored;  // the reader says of it
+    if (std::filesystem::is_directory(path, ignored))
+        throw input_error(path, 0, "it is a folder: name the scene's file in it");
     const bool pbrt = ends_with(path, ".pbrt") || ends_with(path, ".pbrt.gz");
     const bool gltf = ends_with(path, ".gltf") || ends_with(path, ".glb");
     if (!pbrt && !gltf) return load_mitsuba(path, options);

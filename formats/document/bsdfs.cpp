@@ -68,7 +68,7 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const bool bump = object->type == "bumpmap";
             const Object* texture = in.take("texture");
             if (!texture) in.fail(object->type + " has no texture");
-            const ScaledTexture scaled = load_scaled_texture(builder, *texture);
+            const ScaledTexture scaled = load_scaled_texture(builder, *texture, TextureUse::map);
             (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
             if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
             const bool by_default = object->version >= 2;  // Mitsuba 3.7 and later, of files of Mitsuba 2 too

@@ -89,8 +89,9 @@ uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allo
 /// there, is 1 then.
 /// `channel` 0 to 3 puts that one of red, green, blue and alpha into all colours; alpha is linear.
 /// `given`: of the document, not of a file.
-LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1,
-                       const Texels* given = nullptr);
+/// `colors`: what is below 0 is 0 (note).
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, bool colors,
+                       int channel = -1, const Texels* given = nullptr);
 
 /// A parameter that is not followed, and the values, "a|b", with which it needs not be.
 struct LeftOut {
@@ -157,7 +158,7 @@ private:
 };
 
 /// What a texture is read for.
-enum class TextureUse { color, number, light };
+enum class TextureUse { color, number, light, map };
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// Whether a texture takes its values from the mesh.

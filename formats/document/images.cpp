@@ -1,4 +1,6 @@
 // Images on their way into a scene.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstring>
 
@@ -71,8 +73,9 @@ void place_bytes(Builder& builder, const std::string& pool, const uint8_t* bytes
 }
 
 void place_image(Builder& builder, const std::string& path, const std::string& pool, const Texels& image, bool as_float,
-                 LoadedImage& out) {
+                 bool colors, LoadedImage& out) {
     Rgb& largest = out.facts.largest;
+    float smallest = 0;
     double mean[3] = {0, 0, 0};
     const size_t count = size_t(image.width) * image.height;
     if (image.is_8bit && !as_float) {
@@ -93,8 +96,14 @@ void place_image(Builder& builder, const std::string& path, const std::string& p
                 throw input_error(path, 0,
                                   "texel (" + std::to_string(i / 4 % image.width) + ", " +
                                       std::to_string(i / 4 / image.width) + ") is not finite");
-            if (const int c = int(i % 4); c < 3) mean[c] += texels[i], largest[c] = std::max(largest[c], texels[i]);
+            const int c = int(i % 4);
+            if (c == 3) continue;
+            smallest = std::min(smallest, texels[i]);
+            if (colors) texels[i] = std::max(texels[i], 0.0f);
+            mean[c] += texels[i], largest[c] = std::max(largest[c], texels[i]);
         }
+        if (colors && smallest < 0)
+            out.notes.push_back(fmt::format("colours below 0, down to {:.3g}, count as 0", smallest));
         out.offset = append_floats(builder.scene, texels, as_float, out.format);
     }
     out.facts.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
@@ -110,7 +119,7 @@ void place_again(Builder& builder, const std::string& pool, LoadedImage& image) 
 }
 
 LoadedImage read_and_place(Builder& builder, const std::string& path, const std::string& pool, double gamma,
-                           bool as_float, int channel, const Texels* given) {
+                           bool as_float, bool colors, int channel, const Texels* given) {
     LoadedImage out;
     Texels own;
     if (!given) {
@@ -130,18 +139,24 @@ LoadedImage read_and_place(Builder& builder, const std::string& path, const std:
     out.facts.file = path;
     out.memory = uint64_t(image.width) * image.height * (image.is_8bit && !as_float ? 4 : 16);
     builder.take_memory(out.memory, path);
-    place_image(builder, path, pool, image, as_float, out);
+    place_image(builder, path, pool, image, as_float, colors, out);
     return out;
 }
 
 }  // namespace
 
-LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel,
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, bool colors, int channel,
                        const Texels* given) {
     const std::string name = (given ? "given|" : "") + path + "|";
-    const std::string key = name + std::to_string(gamma) + (as_float ? "|float" : "") + std::to_string(channel);
-    const auto known = builder.images.find(key);
-    if (known != builder.images.end()) return known->second;
+    const auto key_of = [&](bool c) {
+        return name + std::to_string(gamma) + (as_float ? "|float" : "") + (c ? "|colors" : "") +
+               std::to_string(channel);
+    };
+    const std::string key = key_of(colors);
+    for (const bool c : {colors, !colors})
+        if (const auto known = builder.images.find(key_of(c)); known != builder.images.end())
+            if (c == colors || known->second.format == TexelFormat::rgba8)
+                return known->second;  // bytes are not below 0
 
     const ScopedSeconds clock(&builder.options.times->read);
     const std::string pool = name + std::to_string(channel);
@@ -152,7 +167,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         builder.take_memory(out.memory, path);
         place_again(builder, pool, out);
     } else {
-        out = read_and_place(builder, path, pool, gamma, as_float, channel, given);
+        out = read_and_place(builder, path, pool, gamma, as_float, colors, channel, given);
     }
     if (!given) builder.file_digests.push_back({path, out.digest});
     note_image(builder.scene.notes, path, out.notes);

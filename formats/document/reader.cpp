@@ -314,11 +314,14 @@ void Reader::finish() {
             builder_.refuse(v.where, unknown(v, known), "it is ignored");
     for (const Child& child : object_.children)
         if (!used_children_.count(&child))
-            builder_.refuse(child.where,
-                            "unexpected " + child.object->tag + " '" + child.object->type + "'" +
-                                (child.name.empty() ? "" : " (name '" + child.name + "')") + " in " + object_.tag +
-                                " '" + object_.type + "'",
-                            "it is ignored");
+            builder_.refuse(
+                child.where,
+                (is_one_of({"medium", "phase", "subsurface", "volume"}, child.object->tag) ? "not supported: "
+                                                                                           : "unexpected ") +
+                    child.object->tag + " '" + child.object->type + "'" +
+                    (child.name.empty() ? "" : " (name '" + child.name + "')") + " in " + object_.tag + " '" +
+                    object_.type + "'",
+                "it is ignored");
 }
 
 Matrix rigid_part(const Matrix& m, bool& problem) {

@@ -67,18 +67,21 @@ int32_t add_texture(Builder& builder, const Texture& texture, const TextureFacts
     return it->second;
 }
 
+bool is_color(TextureUse use) { return use == TextureUse::color || use == TextureUse::light; }
+
 /// Value of a rawconstant: a number or three of them, which need be no colour.
-Rgb raw_value(Reader& in) {
+Rgb raw_value(Reader& in, bool colors) {
     const Value* value = in.object().find("value");
     if (!value) in.fail_without("value", "rawconstant has no value");
     if (value->kind != ValueKind::vector) return in.color("value", {}, SpectrumUse::unbounded);
     const Vec3d v = in.vector("value", {});
+    if (colors && std::min({v.x, v.y, v.z}) < 0) in.fail(in.where("value"), "'value' is negative");
     return {float(v.x), float(v.y), float(v.z)};
 }
 
-/// What colours of textures may be: those of lights and numbers have no largest one.
+/// What colours of textures may be: those of lights, numbers and maps have no largest one.
 SpectrumUse colors_of(TextureUse use) {
-    if (use == TextureUse::number) return SpectrumUse::unbounded;
+    if (!is_color(use)) return SpectrumUse::unbounded;
     return use == TextureUse::light ? SpectrumUse::emission : SpectrumUse::reflectance;
 }
 
@@ -126,7 +129,7 @@ void set_image(Texture& texture, const LoadedImage& image) {
 }
 
 /// An image of a file or of the document.
-void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& facts) {
+void read_bitmap(Builder& builder, Reader& in, TextureUse use, Texture& texture, TextureFacts& facts) {
     const Texels* given = given_image(builder, in);
     const std::string name = in.text(given ? "image" : "filename", "");
     if (name.empty()) in.fail_without("filename", "bitmap texture has no filename");
@@ -143,8 +146,8 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
              "textures are stored in our own way");
     in.finish();
     if (builder.validate_only) return;
-    const LoadedImage image =
-        load_image(builder, path, gamma, false, channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
+    const LoadedImage image = load_image(builder, path, gamma, false, is_color(use),
+                                         channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
     set_image(texture, image);
     facts = image.facts;
 }
@@ -196,12 +199,12 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
     TextureFacts facts{{}, {}, object.where.file};
     if (object.type == "bitmap") {
-        read_bitmap(builder, in, texture, facts);
+        read_bitmap(builder, in, use, texture, facts);
     } else if (object.type == "checkerboard") {
         read_checkerboard(builder, in, use, texture, facts);
     } else if (object.type == "rawconstant") {
         texture.type = TextureType::checkerboard;
-        texture.color0 = texture.color1 = facts.mean = facts.largest = raw_value(in);
+        texture.color0 = texture.color1 = facts.mean = facts.largest = raw_value(in, is_color(use));
         in.finish();
     } else if (object.type == "gridtexture") {
         read_grid(builder, in, use, texture, facts);
@@ -243,7 +246,7 @@ int32_t add_texels(Builder& builder, uint32_t width, uint32_t height, const std:
 int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest,
                                const Texels* given) {
     const double gamma = given ? 1 : in.object().version < 2 ? read_gamma(in) : 0;
-    const LoadedImage image = load_image(builder, path, gamma, true, -1, given);
+    const LoadedImage image = load_image(builder, path, gamma, true, true, -1, given);
     largest = max_component(image.facts.largest);
     return add_plain_texture(builder, image);
 }

@@ -106,7 +106,11 @@ private:
         add_child(parent, textures_.scaled(textures_.bitmap(texture, true, channel), splat(float(factor))), name);
     }
 
-    double ior() { return number(extension(m_.extensions, "KHR_materials_ior"), "ior", 1.5); }
+    /// 0 stands for a Fresnel term of 1.
+    double ior() {
+        const double n = number(extension(m_.extensions, "KHR_materials_ior"), "ior", 1.5);
+        return n == 0 ? 1000 : n;
+    }
 
     /// Mean of a texture that has no place here, or 1.
     Rgb mean_of(const tinygltf::Value* of, const char* name, bool raw) {

@@ -34,7 +34,7 @@ struct Mesh {
     std::vector<std::string> notes;  ///< what the file has and the mesh has not
 };
 
-/// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
+/// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (polygons.h).
 /// Vertices with the same triple of indices are shared. Faces of two corners and other statements are left out.
 /// `flip_v`: v becomes 1-v (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by
 /// all readers. Colours behind the places of vertices are kept if `attributes` has vertex_color.

@@ -6,6 +6,7 @@
 #include "formats/file_budget.h"
 #include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
+#include "formats/meshes/polygons.h"
 
 namespace ambilux {
 
@@ -27,6 +28,7 @@ struct ObjReader {
     uint64_t names_no_uv = 0, names_no_normal = 0;  ///< the first line that names one before the file has any
 
     [[noreturn]] void fail(const std::string& message) const { throw input_error(path, text.line, message); }
+    Vec3d place(uint32_t v) const { return {positions[v][0], positions[v][1], positions[v][2]}; }
 
     /// A backslash at the end of a line stands for a blank, and '#' begins a comment.
     bool at_end() {
@@ -189,7 +191,8 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     CornerMap vertex_of;
     std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
-    std::vector<uint32_t> polygon;
+    PolygonCutter cutter;
+    std::vector<uint32_t>& polygon = cutter.polygon;
     bool some_normals = false, some_uvs = false, lacks_normals = false;
 
     for (; !in.text.done(); in.next_statement()) {
@@ -216,7 +219,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
                 lacks_normals |= corners[v].vn == kAbsent;
                 some_uvs |= corners[v].vt != kAbsent;
             }
-            for (size_t i = 2; i < polygon.size(); ++i) mesh.faces.push_back({polygon[0], polygon[i - 1], polygon[i]});
+            cutter.add_to(mesh.faces, [&](uint32_t v) { return in.place(corners[v].v); });
             budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
         } else {
             leave_out(in, keyword);

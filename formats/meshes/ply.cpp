@@ -9,6 +9,7 @@
 #include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/ply_blocks.h"
+#include "formats/meshes/polygons.h"
 
 namespace ambilux {
 
@@ -77,6 +78,7 @@ struct MeshBuilder {
     std::string unused = {};
     std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
     std::vector<Vec2f> corner_uvs = {};              ///< of faces up to the last one that has some
+    PolygonCutter cutter = {};
 
     void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
@@ -281,39 +283,42 @@ private:
         }
     }
 
-    /// Of the fan of `corners` triangle corners that begins at face `first`.
-    void add_corner_uvs(size_t first, size_t corners, const std::vector<Vec2f>& uvs) {
+    void add_corner_uvs(size_t first, size_t corners, const std::vector<Vec2f>& uvs) {  // of the last polygon
         if (uvs.empty() || corners < 3) return;
         if (uvs.size() != corners)
             in.fail("a face of " + std::to_string(corners) + " corners has texture coordinates of " +
                     std::to_string(uvs.size()));
         corner_uvs.resize(3 * first);
-        for (size_t k = 2; k < corners; ++k) corner_uvs.insert(corner_uvs.end(), {uvs[0], uvs[k - 1], uvs[k]});
+        for (const auto& t : cutter.triangles) corner_uvs.insert(corner_uvs.end(), {uvs[t[0]], uvs[t[1]], uvs[t[2]]});
     }
 
     void read_faces(const Element& element) {
         budget.bytes(mesh_bytes(vertices, element.count));
         mesh.faces.reserve(element.count);
-        std::vector<uint32_t> polygon;
         std::vector<Vec2f> uvs;
+        const auto place = [&](uint32_t v) {  // zero of what the file has later, or not at all
+            if (v >= points.size()) return v < mesh.positions.size() ? in_double(mesh.positions[v]) : Vec3d{};
+            return Vec3d{points[v][0], points[v][1], points[v][2]};
+        };
         const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
         for (uint64_t i = 0; i < element.count; ++i) {
             if (layout.valid) {
                 const uint64_t read = read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
-                                                       std::min(kBlock, element.count - i), mesh.faces);
+                                                       std::min(kBlock, element.count - i), mesh.faces,
+                                                       [&](size_t at) { cutter.cut_fan(mesh.faces, at, place); });
                 budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
                 budget.tick(read);
                 has_faces |= read > 0;
                 if ((i += read) == element.count) break;
             }
             const size_t first = mesh.faces.size();
-            polygon.clear();
+            cutter.polygon.clear();
             for (const Property& p : element.properties) {
                 if (p.role == Role::corners) {
                     has_faces = true;
                     uint32_t left = in.index(p.count_type);
                     budget.bytes(mesh_bytes(vertices, mesh.faces.size() + left));
-                    for (; left > 0; --left) polygon.push_back(in.index(p.type));
+                    for (; left > 0; --left) cutter.polygon.push_back(in.index(p.type));
                 } else if (p.role == Role::corner_uvs) {
                     read_corner_uvs(p, uvs);
                 } else if (p.list) {
@@ -322,9 +327,9 @@ private:
                     property_value(p, first);
                 }
             }
-            thin_faces += polygon.size() < 3;
-            for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
-            add_corner_uvs(first, polygon.size(), uvs);
+            thin_faces += cutter.polygon.size() < 3;
+            cutter.add_to(mesh.faces, place);
+            add_corner_uvs(first, cutter.polygon.size(), uvs);
             for (MeshAttribute& a : mesh.attributes)
                 if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
             budget.bytes(mesh_bytes(vertices + corner_uvs.size(), mesh.faces.size()));

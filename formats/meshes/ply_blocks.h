@@ -89,11 +89,12 @@ inline FaceLayout face_layout(const Element& element) {
     return layout;
 }
 
-/// Appends fans of up to `count` faces, and moves `at` behind them. Stops before a face that is cut off, has other than
+/// Appends fans of up to `count` faces, and moves `at` behind them; `cut` gets the first triangle of a fan of several
+/// when it is the last of `triangles`. Stops before a face that is cut off, has other than
 /// 3 to 16 corners, or has a number that is no index: the caller reads or refuses it. Returns how many were read.
-template <class Triangles>
+template <class Triangles, class Cut>
 uint64_t read_small_faces(const FaceLayout& layout, bool swap, const char*& at, const char* end, uint64_t count,
-                          Triangles& triangles) {
+                          Triangles& triangles, Cut&& cut) {
     const auto read = [&](auto count_tag, auto index_tag) {
         using Count = decltype(count_tag);
         using Index = decltype(index_tag);
@@ -123,6 +124,7 @@ uint64_t read_small_faces(const FaceLayout& layout, bool swap, const char*& at, 
                 triangles.resize(triangles.size() - (size_t(corners) - 2));
                 break;
             }
+            if (corners > 3) cut(triangles.size() - (size_t(corners) - 2));
             at += size;
         }
         return done;

@@ -18,6 +18,8 @@ from ambilux.errors import SceneError
 
 TAG_OF: dict[str, str] = _core.plugins()  # of each type that the reader of scene files knows
 COLOURS = ("rgb", "srgb", "spectrum")
+#: Spectra that are objects.
+SPECTRA = ("uniform", "d65", "blackbody", "regular", "irregular")
 #: Keys of arrays in memory.
 MESH_KEYS, IMAGE_KEY = ("vertex_positions", "vertex_normals", "vertex_texcoords", "faces"), "data"
 
@@ -109,10 +111,21 @@ def add_colour(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> 
         fail(path, f"a {value['type']} has a value: numbers")
 
 
+def add_spectrum(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> None:
+    lines.add(element("spectrum", "", type=value["type"], name=name), path)
+    for key, inner in value.items():
+        if key != "type":
+            values = number_list(inner)
+            add_value(lines, str(key), inner if values is None else joined(values), f"{path}.{key}")
+    lines.add("</spectrum>", path)
+
+
 def add_value(lines: Lines, name: str, value: Any, path: str) -> None:
     value = plain(value)
     if isinstance(value, Mapping) and value.get("type") in COLOURS:
         add_colour(lines, name, value, path)
+    elif isinstance(value, Mapping) and value.get("type") in SPECTRA:
+        add_spectrum(lines, name, value, path)
     elif isinstance(value, Mapping) and value.get("type") == "ref":
         lines.add(element("ref", name=name, id=str(value.get("id", ""))), path)
     elif name.startswith("to_") or hasattr(value, "matrix"):

@@ -147,6 +147,8 @@ class Image:
         name = os.fspath(path)
         os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
         if name.lower().endswith(".png"):
+            if not abs(exposure) <= 100:
+                raise UsageError(f"exposure {exposure}: 100 stops at most, up or down")
             _core.write_png(name, self.rgb, exposure)
         elif name.lower().endswith(".exr"):
             if stderr and self.stderr is None:
@@ -157,7 +159,10 @@ class Image:
 
 
 def pixels(value: Any) -> np.ndarray:
-    array = np.ascontiguousarray(value, dtype=np.float32)
+    given = np.asarray(value)
+    if given.dtype.kind != "f":
+        raise UsageError(f"an image holds floats, linear radiance, not {given.dtype}")
+    array = np.ascontiguousarray(given, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
         raise UsageError(f"an image has the shape (height, width, 3), not {array.shape}")
     return array

@@ -166,7 +166,16 @@ def text_of(name: str, value: Any, kind: str | None, lines: dictionary.Lines) ->
 
 
 def array_of(name: str, value: Any, dtype: Any, columns: int) -> np.ndarray:
-    array = np.ascontiguousarray(plain(value), dtype=dtype)
+    try:
+        source = np.asarray(plain(value))
+    except ValueError:
+        fail(name, "rows of one length are needed")
+    if source.dtype.kind not in "fiu":
+        fail(name, f"numbers are needed, not {source.dtype}")
+    with np.errstate(all="ignore"):
+        array = np.ascontiguousarray(source, dtype=dtype)
+    if array.dtype.kind == "u" and not np.array_equal(array, source):
+        fail(name, "whole numbers from 0 to 2**32 - 1 are needed, indices of vertices")
     if array.ndim == 1 and array.size % columns == 0:
         array = array.reshape(-1, columns)  # as Mitsuba has them
     if array.ndim != 2 or array.shape[1] != columns:
@@ -201,7 +210,11 @@ def image_edit(name: str, key: str, value: Any) -> _core.Edit:
         array = array[:, :, None]
     if array.ndim != 3 or array.shape[2] not in (1, 3, 4) or array.size == 0 or array.dtype.kind not in "fiu":
         fail(key, f"an array of (height, width), or with 1, 3 or 4 channels, is needed, not {array.shape} of {array.dtype}")
+    if array.dtype.kind in "iu" and array.dtype != np.uint8 and (array.min() < 0 or array.max() > 1):
+        fail(key, f"floats, which are linear, or bytes (uint8), as a PNG file has them, are needed, not {array.dtype}")
     array = array if array.dtype == np.uint8 else array.astype(np.float32)
+    if not np.isfinite(array).all():
+        fail(key, "a value is not finite")
     if array.shape[2] == 1:
         array = np.repeat(array, 3, axis=2)
     if array.shape[2] == 3:

@@ -181,6 +181,8 @@ def test_files(scene, tmp_path):
     image.save(tmp_path / "new" / "a.exr")
     image.save(tmp_path / "new" / "r.exr", stderr=True)
     image.save(tmp_path / "new" / "a.png", exposure=1)
+    with pytest.raises(ambilux.UsageError, match="exposure nan: 100 stops at most"):
+        image.save(tmp_path / "new" / "b.png", exposure=float("nan"))
     plain, whole = ambilux.read(tmp_path / "new" / "a.exr"), ambilux.read(tmp_path / "new" / "r.exr")
     np.testing.assert_array_equal(plain.rgb, image.rgb)
     np.testing.assert_array_equal(whole.stderr, image.stderr)

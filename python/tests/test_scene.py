@@ -153,5 +153,47 @@ def test_coatings_and_grids_stand_in_dictionaries():
         ambilux.Scene(changed("ball.bsdf", {"type": "rough_dielectric"}))
 
 
+def test_spectra_that_are_objects_stand_in_dictionaries():
+    def seen(radiance):
+        lamp = changed("ball.emitter", {"type": "area", "radiance": radiance})
+        return ambilux.render(ambilux.Scene(lamp), spp=1, max_depth=1, backend="cpu").rgb[6, 8]
+
+    pairs = {"type": "spectrum", "value": [(360, 1), (830, 2)]}
+    np.testing.assert_array_equal(seen({"type": "d65", "scale": 2.0}), [2, 2, 2])
+    np.testing.assert_array_equal(seen({"type": "regular", "wavelength_min": 360, "wavelength_max": 830, "values": [1, 2]}), seen(pairs))
+    np.testing.assert_array_equal(seen({"type": "irregular", "wavelengths": "360, 830", "values": "1, 2"}), seen(pairs))
+    red, _, blue = seen({"type": "blackbody", "temperature": 3000})
+    assert red > blue > 0
+    with pytest.raises(ambilux.SceneError, match="unknown parameter 'colour'") as e:
+        seen({"type": "d65", "colour": 1})
+    assert e.value.key == "ball.emitter.radiance.colour"
+
+
+def test_arrays_are_read_as_they_are_or_refused():
+    def mesh(**arrays):
+        triangle = {"vertex_positions": np.eye(3), "faces": np.array([[0, 1, 2]])}
+        return ambilux.Scene(changed("thing", {"type": "mesh", **triangle, **arrays}))
+
+    def image(data):
+        return ambilux.Scene(changed("ball.bsdf.reflectance", {"type": "bitmap", "data": data}))
+
+    for faces in (np.array([[0, 1, 2]], ">i8"), np.array([[0.0, 1.0, 2.0]]), [[0, 1, 2]]):
+        assert mesh(faces=faces).info.triangles == mesh().info.triangles
+    for faces in ([[0, 1, 2.5]], [[0, 1, -1]], [[0, 1, 2**32 + 2]], [[0, 1, np.nan]]):
+        with pytest.raises(ambilux.SceneError, match="thing.faces: whole numbers from 0"):
+            mesh(faces=np.array(faces))
+    for positions in (np.eye(3, dtype=bool), np.eye(3, dtype=complex), np.eye(3).astype("S")):
+        with pytest.raises(ambilux.SceneError, match="thing.vertex_positions: numbers are needed, not "):
+            mesh(vertex_positions=positions)
+    with pytest.raises(ambilux.SceneError, match="rows of one length"):
+        mesh(vertex_positions=[[0, 0, 1], [0, 1]])
+    image([[0, 1], [1, 0]])
+    for wrong, text in ((np.full((2, 2), 300, np.uint16), "floats, which are linear, or bytes"), (np.full((2, 2), np.nan), "a value is not finite")):
+        with pytest.raises(ambilux.SceneError, match="ball.bsdf.reflectance.data: " + text):
+            image(wrong)
+    with pytest.raises(ambilux.UsageError, match="floats, linear radiance, not uint8"):
+        ambilux.compare(np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2, 3)))
+
+
 def numpy_equal(a, b):
     return np.array_equal(a.rgb, b.rgb)

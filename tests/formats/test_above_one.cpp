@@ -88,6 +88,24 @@ TEST_CASE("what reflects more than 1 warns once with its file and its largest va
     CHECK(warns(mesh, "'reflectance' is up to 1.25, by " + (folder.path / "walls.ply").string()));
 }
 
+TEST_CASE("colours below 0 in images count as 0, with a note; heights may be negative") {
+    const TempFolder folder;
+    folder.write("bright.pfm", pfm(-0.5f, 0.5f, 0.25f));
+    const auto loaded = [&](const std::string& body) { return load(body, {}, "3.0.0", &folder); };
+    const std::string said = "bright.pfm: colours below 0, down to -0.5, count as 0";
+    const Scene s = loaded(textured("bitmap", kBright));
+    CHECK(has_note(s, said));
+    CHECK(reflectance(s, 0, {0.5f, 0.5f}) == Rgb{0, 0.5f, 0.25f});
+    CHECK(has_note(loaded("<shape type='rectangle'><emitter type='area'><texture type='bitmap' name='radiance'>" +
+                          kBright + "</texture></emitter></shape>"),
+                   said));
+    CHECK(has_note(loaded("<emitter type='envmap'>" + kBright + "</emitter><shape type='rectangle'/>"), said));
+    CHECK_FALSE(has_note(loaded("<shape type='rectangle'><bsdf type='bumpmap'><texture type='bitmap'>" + kBright +
+                                "</texture><bsdf type='diffuse'/></bsdf></shape>"),
+                         said));
+    CHECK(contains(error_of(textured("rawconstant", "<vector name='value' x='-1' y='0' z='0'/>")), "is negative"));
+}
+
 TEST_CASE("pbrt: images that reflect more than 1 reflect 1, as there") {
     const TempFolder folder;
     folder.write("bright.pfm", pfm(0.5f, 1.5f, 0.25f));

@@ -164,6 +164,11 @@ TEST_CASE("specular factors and sheen, as Blender writes them") {
     CHECK(principled_of({{"KHR_materials_specular", {{"specularColorFactor", {0.5, 0.5, 0.5}}}}}).ior ==
           Approx((1 + root) / (1 - root)).epsilon(1e-5));
     CHECK(principled_of({{"KHR_materials_specular", {{"specularFactor", 0}}}}).ior == 1);
+    // 0 stands for a Fresnel term of 1, which the specular colour scales.
+    CHECK(principled_of({{"KHR_materials_ior", {{"ior", 0}}}}).ior == 1000);
+    CHECK(principled_of({{"KHR_materials_ior", {{"ior", 0}}},
+                         {"KHR_materials_specular", {{"specularColorFactor", {0.04, 0.04, 0.04}}}}})
+              .ior == Approx(1.5).epsilon(1e-3));
     CHECK(principled_of({{"KHR_materials_sheen", {{"sheenColorFactor", {0.1, 0.3, 0.2}}}}}).sheen == Approx(0.3));
     Json j = quad_scene();
     j["materials"][0]["extensions"] = {{"KHR_materials_specular", {{"specularTexture", {{"index", 0}}}}}};
@@ -320,6 +325,12 @@ TEST_CASE("files that lie are refused") {
     CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 3; }),
                    "no texture 3"));
     CHECK(changed([](Json& j) { j["asset"].erase("version"); }) != "no error");
+    // tinygltf would leave out the whole material.
+    CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1}; }),
+                   "baseColorFactor"));
+    CHECK(contains(
+        changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = Json::object(); }),
+        "'index' property is missing"));
     // Images inside of buffers.
     for (const auto& [key, value, problem] :
          std::vector<std::tuple<std::string, Json, std::string>>{{"byteOffset", 4000000000u, "beyond the buffer"},

@@ -54,6 +54,59 @@ std::string deflate_bytes(const std::string& raw) {
 
 }  // namespace
 
+namespace {
+
+/// Sums of the triangles' areas and of their areas as vectors, along z.
+std::pair<double, double> areas(const Mesh& mesh) {
+    double sum = 0, along_z = 0;
+    for (const auto& f : mesh.faces) {
+        const Vec3f n = cross(mesh.positions[f[1]] - mesh.positions[f[0]], mesh.positions[f[2]] - mesh.positions[f[0]]);
+        sum += 0.5 * double(length(n)), along_z += 0.5 * double(n.z);
+    }
+    return {sum, along_z};
+}
+
+}  // namespace
+
+TEST_CASE("concave polygons are covered by their triangles, from whichever corner the file begins") {
+    // An arrow, a comb of three teeth, and a ring with a slit.
+    const std::vector<std::vector<std::pair<int, int>>> shapes = {
+        {{0, 0}, {2, 4}, {0, 3}, {-2, 4}},
+        {{0, 0}, {6, 0}, {6, 4}, {5, 4}, {4, 1}, {4, 4}, {3, 4}, {2, 1}, {2, 4}, {0, 4}},
+        {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}}};
+    const double expected[] = {6, 21, 12};
+    for (size_t i = 0; i < shapes.size(); ++i)
+        for (size_t first = 0; first < shapes[i].size(); ++first) {
+            CAPTURE(i, first);
+            const size_t n = shapes[i].size();
+            std::string obj, places, face = std::to_string(n), binary_face(1, char(n));
+            for (size_t k = 0; k < n; ++k) {
+                const auto [x, y] = shapes[i][k];
+                const std::string at = std::to_string(x) + " " + std::to_string(y) + " 0\n";
+                obj += "v " + at, places += at;
+            }
+            const std::string head = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(n) +
+                                     "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                                     "property list uchar int vertex_indices\nend_header\n";
+            std::string binary = head;
+            binary.replace(binary.find("ascii"), 5, "binary_little_endian");
+            for (const auto& [x, y] : shapes[i])
+                for (const int v : {x, y, 0}) put(binary, float(v));
+            obj += "f";
+            for (size_t k = 0; k < n; ++k) {
+                const size_t corner = (first + k) % n;
+                obj += " " + std::to_string(corner + 1), face += " " + std::to_string(corner);
+                put(binary_face, int32_t(corner));
+            }
+            for (const Mesh& mesh : {read_obj("a.obj", obj, false), read_ply("a.ply", head + places + face, false),
+                                     read_ply("a.ply", binary + binary_face, false)}) {
+                CHECK(mesh.faces.size() == n - 2);
+                CHECK(areas(mesh).first == Approx(expected[i]));
+                CHECK(areas(mesh).second == Approx(expected[i]));
+            }
+        }
+}
+
 TEST_CASE("OBJ: corners of all forms, negative indices, polygons, shared vertices") {
     const std::string text =
         "# comment\r\n"

@@ -35,7 +35,8 @@ TEST_CASE("what a plugin does not know is left out with a note in the older gene
     CHECK(contains(error_of(body), "unknown parameter 'alpha' of bsdf 'dielectric'"));
     const std::string root = "<integer name='maxDepth' value='3'/>";
     CHECK(has_note(load_quietly(root, "0.5.0"), "parameter 'max_depth' of scene is not known"));
-    CHECK(contains(error_of("<shape type='rectangle'><phase type='hg'/></shape>", {}, "0.6.0"), "unexpected phase"));
+    CHECK(
+        contains(error_of("<shape type='rectangle'><phase type='hg'/></shape>", {}, "0.6.0"), "not supported: phase"));
 }
 
 TEST_CASE("of a parameter that is given twice the last one counts in the older generation") {

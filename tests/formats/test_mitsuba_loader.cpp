@@ -514,7 +514,7 @@ TEST_CASE("mistakes are named with file and line") {
         {"<sensor type='thinlens'/>", "thinlens has no aperture_radius"},
         {"<bsdf type='mask' id='m'><ref id='m'/></bsdf>", "circular reference to id 'm'"},
         {"<medium type='homogeneous' id='m'/><shape type='sphere'><ref id='m' name='interior'/></shape>",
-         "unexpected medium 'homogeneous' (name 'interior') in shape 'sphere'"},
+         "not supported: medium 'homogeneous' (name 'interior') in shape 'sphere'"},
         {"<thing/>", "scene.xml:2: unknown element <thing>"},
         {"<shap type='sphere'/>", "unknown element <shap>: <shape> is known"},
         {"<sphere/>", "unknown element <sphere>: 'sphere' is a type of <shape>"},
@@ -559,6 +559,7 @@ TEST_CASE("mistakes are named with file and line") {
     CHECK_THROWS_AS(load_mitsuba("/nonexistent/scene.xml"), Error);
     const std::string empty = folder.write("empty.xml", "<scene version='3.0.0'/>");
     CHECK_THROWS_WITH(load_mitsuba(empty), empty + ": the scene has no sensor");
+    CHECK_THROWS_WITH(load_scene_file(std::string(300, 'a'), {}), std::string(300, 'a') + ": File name too long");
 }
 
 TEST_CASE("lenient loading lists each substitution once") {

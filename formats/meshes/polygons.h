@@ -1,0 +1,41 @@
+// Faces of more than three corners.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/vec3d.h"
+
+namespace ambilux {
+
+using Triangles = std::vector<std::array<uint32_t, 3>>;
+
+/// Numbers of the corners of triangles that cover a polygon: a fan from the first corner, or where that would reach
+/// beyond a concave polygon, its ears. What crosses itself becomes a fan. There are two triangles fewer than corners.
+void cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles);
+
+/// Makes faces of a mesh from polygons, one at a time. `place` of a vertex is where it lies.
+struct PolygonCutter {
+    std::vector<uint32_t> polygon;  ///< vertices
+    Triangles triangles;            ///< of its corners
+    std::vector<Vec3d> places;      ///< of its corners
+
+    template <class Place>
+    void add_to(Triangles& faces, const Place& place) {
+        places.clear();
+        for (const uint32_t v : polygon) places.push_back(place(v));
+        cut_polygon(places, triangles);
+        for (const auto& t : triangles) faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
+    }
+    /// The polygon of the fan from face `first` to the last one.
+    template <class Place>
+    void cut_fan(Triangles& faces, size_t first, const Place& place) {
+        polygon = {faces[first][0], faces[first][1]};
+        for (size_t i = first; i < faces.size(); ++i) polygon.push_back(faces[i][2]);
+        faces.resize(first);
+        add_to(faces, place);
+    }
+};
+
+}  // namespace ambilux
