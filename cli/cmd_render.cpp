@@ -106,6 +106,7 @@ int conclude(const RenderArguments& o, const LoadedScene& loaded, const RenderSe
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json.update(found);
         json["interrupted"] = position.interrupted;
+        json["iteration_samples"] = position.iteration_samples;
         write_json(o.json, json);
     }
     if (position.interrupted) {

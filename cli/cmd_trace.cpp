@@ -5,8 +5,10 @@
 
 #include "cli/commands.h"
 #include "core/error.h"
+#include "film/exr_io.h"
 #include "render/replay/print.h"
 #include "render/replay/replay.h"
+#include "session/guide_tree.h"
 #include "session/replays.h"
 
 namespace ambilux {
@@ -15,7 +17,7 @@ namespace {
 struct TraceArguments {
     SceneOptions scene;
     RenderOptions render;
-    std::string pixel, strategy, json;
+    std::string pixel, strategy, json, guide;
     std::optional<uint32_t> sample, light_subpath;
     bool compare = false;
 };
@@ -44,14 +46,30 @@ void compare(const Scene& scene, const RenderSettings& settings, const ReplayReq
     json["by_segments"] = by_length_json(lengths);
 }
 
+/// Pictures of what was learned where the eye subpath met something, one layer a vertex, and statistics of the trees.
+void show_guide(const Replay& replay, const Scene& scene, const ReplaySample& sample, const std::string& path,
+                nlohmann::json& json, std::string& text) {
+    const std::shared_ptr<const GuidedState> guide = guide_of(replay, sample.sample, "--");
+    json["guide"] = guide_json(guide_arrays(*guide, scene), *guide);
+    text += guide_text(json["guide"]);
+    std::vector<Layer> layers;
+    for (const ReplayVertex& v : sample.eye.vertices)
+        if (!v.miss) layers.push_back(guide_layer(*guide, v.p, fmt::format("vertex{}", v.depth)));
+    if (layers.empty()) throw Error(ExitCode::usage, "--guide: the eye subpath meets nothing");
+    Image first = {kGuidePictureWidth, kGuidePictureHeight, {}};
+    for (const float density : layers[0].values) first.rgb.insert(first.rgb.end(), 3, density);
+    write_exr(path, first, {}, layers);
+}
+
 int trace(const TraceArguments& o) {
     if (o.pixel.empty() && !o.light_subpath)
         throw Error(ExitCode::usage, "trace: --pixel X,Y or --light-subpath N is needed, or both");
     if (o.compare && (o.pixel.empty() || o.light_subpath))
         throw Error(ExitCode::usage, "--compare: --pixel X,Y is needed, without --light-subpath");
+    if (!o.guide.empty() && o.pixel.empty()) throw Error(ExitCode::usage, "--guide: --pixel X,Y is needed");
     ReplayFormat format;
     if (!o.strategy.empty()) format.only = parse_strategy(o.strategy);
-    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
+    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}, {"--guide", o.guide}});
     format.origin = loaded.scene.origin;
     ReplayRequest request;
     if (!o.pixel.empty()) parse_pixel(o.pixel, loaded.scene.sensor, request);
@@ -64,6 +82,8 @@ int trace(const TraceArguments& o) {
     const auto report = [&](const auto&... seen) {
         nlohmann::json json = replay_json(seen..., format);
         std::string text = replay_text(seen..., format);
+        if constexpr (sizeof...(seen) == 1)
+            if (!o.guide.empty()) show_guide(*replay, loaded.scene, seen..., o.guide, json, text);
         if (o.compare) compare(loaded.scene, settings, request, accels, json, text);
         if (!o.json.empty()) write_json(o.json, json);
         if (o.json != "-") std::cout << text << std::flush;
@@ -97,6 +117,10 @@ void add_trace(CLI::App& app, Run& run) {
     command.add_flag("--compare", o->compare,
                      "Render the sample as well (with --backend cuda on the device), and print the number of segments "
                      "from which on it differs from the replay");
+    command.add_option(
+        "--guide", o->guide,
+        "Variants guided: write pictures (EXR) of the densities that were learned at the vertices of the "
+        "eye subpath, and print what the trees are like");
     command.add_option("--json", o->json, "Write the replay to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return trace(*o); }; });
 }

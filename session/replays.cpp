@@ -14,8 +14,8 @@ std::unique_ptr<SampleWatch> watch_samples(std::unique_ptr<Renderer> renderer, c
     if (const uint32_t together = renderer->iteration_samples(); together > 1)
         throw Error(
             ExitCode::usage,
-            fmt::format("{}outliers: this render adds {} samples of a pixel to the film at once (merge_samples); "
-                        "single ones are seen with merge_samples=1",
+            fmt::format("{}outliers: this render adds {} samples of a pixel to the film at once; single ones are "
+                        "seen with merge_samples=1 or guide_samples=1",
                         prefix, together));
     return std::make_unique<SampleWatch>(std::move(renderer));
 }

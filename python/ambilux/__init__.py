@@ -23,7 +23,7 @@ except ModuleNotFoundError as error:
         raise ImportError(f"ambilux.{name} needs the compiled module ambilux._core, which is not built here: `pip install .` installs it, and scripts/build.sh puts it "
                           "into build/python (PYTHONPATH=build/python)")
 else:
-    from ambilux.commands import Sweep, convert, devices, info, light_vertices, stress, stress_export, stress_families, stress_judge, trace
+    from ambilux.commands import Sweep, convert, devices, guide, info, light_vertices, stress, stress_export, stress_families, stress_judge, trace
     from ambilux.errors import AmbiluxNote, AmbiluxWarning, DeviceError, SceneError, UsageError
     from ambilux.experiments import Progress, Results, experiment
     from ambilux.image import DeviceArray, Image, StrategyImage, compare, read
@@ -34,5 +34,5 @@ else:
     from ambilux.scene import Scene, load
 
 __all__ = ["AmbiluxNote", "AmbiluxWarning", "DeviceArray", "DeviceError", "Image", "Outlier", "Params", "Progress", "Record", "Results", "Scene", "SceneError", "Step", "StrategyImage",
-           "Sweep", "Trace", "UsageError", "__version__", "compare", "convert", "cuda_available", "devices", "experiment", "git_revision", "info", "light_vertices", "load", "progressive",
+           "Sweep", "Trace", "UsageError", "__version__", "compare", "convert", "cuda_available", "devices", "experiment", "git_revision", "guide", "info", "light_vertices", "load", "progressive",
            "read", "reference", "render", "settings_help", "stress", "stress_export", "stress_families", "stress_judge", "trace"]

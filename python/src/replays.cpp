@@ -1,4 +1,5 @@
 // One sample of a render again, with all that happened on its way.
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -8,6 +9,7 @@
 #include "python/src/bindings.h"
 #include "python/src/loaded_scene.h"
 #include "render/replay/print.h"
+#include "session/guide_tree.h"
 #include "session/light_vertices.h"
 #include "session/replays.h"
 
@@ -88,6 +90,40 @@ nb::dict vertices_of(const SharedScene& scene, RenderSettings settings, uint32_t
     return out;
 }
 
+nb::dict trees_of(const SharedScene& scene, RenderSettings settings, uint32_t sample,
+                  std::optional<std::array<double, 3>> point) {
+    if (settings.backend == Backend::automatic) settings.backend = Backend::cpu;
+    GuideArrays a;
+    Layer picture;
+    nlohmann::json statistics;
+    run_unlocked([&](const volatile bool*) {
+        SharedAccels accels(scene->scene, scene->structures);
+        const auto guide = guide_of(*make_replay(scene->scene, settings, accels), sample, "");
+        a = guide_arrays(*guide, scene->scene);
+        statistics = guide_json(a, *guide);
+        if (!point) return;
+        const auto& origin = scene->scene.origin;
+        const Vec3f p = {float((*point)[0] - origin[0]), float((*point)[1] - origin[1]),
+                         float((*point)[2] - origin[2])};
+        picture = guide_layer(*guide, p, "density");
+    });
+    const size_t leaves = a.count.size(), nodes = a.probability.size();
+    nb::dict out;
+    out["low"] = array_of<double>(a.low, {leaves, 3});
+    out["high"] = array_of<double>(a.high, {leaves, 3});
+    out["bsdf_share"] = array_of<float>(a.bsdf_share, {leaves});
+    out["reflected"] = array_of<float>(a.reflected, {leaves});
+    out["depth"] = array_of<uint32_t>(a.depth, {leaves});
+    out["first"] = array_of<uint32_t>(a.first, {leaves});
+    out["count"] = array_of<uint32_t>(a.count, {leaves});
+    out["probability"] = array_of<float>(a.probability, {nodes, 4});
+    out["child"] = array_of<int32_t>(a.child, {nodes, 4});
+    out["statistics"] = json_text(statistics);
+    out["density"] = nb::none();
+    if (point) out["density"] = array_of<float>(picture.values, {kGuidePictureHeight, kGuidePictureWidth});
+    return out;
+}
+
 }  // namespace
 
 void bind_replays(nb::module_& m) {
@@ -98,6 +134,7 @@ void bind_replays(nb::module_& m) {
     m.def("trace", &trace, "scene"_a, "settings"_a, "pixel"_a.none(), "sample"_a, "light_subpath"_a.none(),
           "strategy"_a, "compare"_a, "One sample as JSON and as text.");
     m.def("light_vertices", &vertices_of, "scene"_a, "settings"_a, "sample"_a);
+    m.def("guide", &trees_of, "scene"_a, "settings"_a, "sample"_a, "point"_a.none());
 }
 
 }  // namespace ambilux

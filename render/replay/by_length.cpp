@@ -39,8 +39,13 @@ uint32_t longest_path(const ReplaySample& sample) {
 
 FilmMoments rendered_film(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
-    const uint32_t together = renderer->iteration_samples();
-    renderer->render(sample / together * together, together);
+    const uint32_t together = renderer->iteration_samples(), first = sample / together * together;
+    // What a method has learned is part of a sample.
+    if (renderer->state_kind() == StateKind::per_device && first > 0) {
+        renderer->render(0, first);
+        renderer->clear_film();
+    }
+    renderer->render(first, together);
     return renderer->film();
 }
 

@@ -1,6 +1,7 @@
 // Describes what the primitives of transport/subpath/ did at a vertex, by asking them again: they are pure functions.
 #pragma once
 
+#include "integrators/shared/guide/directions.h"
 #include "render/replay/context.h"
 #include "render/replay/record.h"
 #include "transport/subpath/connection.h"
@@ -10,6 +11,12 @@ namespace ambilux {
 
 inline std::vector<ReplayNumber> named_sums(const UnidirectionalMis::Sums& s) { return {{"pdf_sa", s.pdf_sa}}; }
 inline std::vector<ReplayNumber> named_sums(const MisSums& s) { return {{"dvcm", s.dvcm}, {"dvc", s.dvc}}; }
+template <class Base, bool kBidirectional>
+std::vector<ReplayNumber> named_sums(const GuidedSums<Base, kBidirectional>& s) {
+    std::vector<ReplayNumber> all = named_sums(static_cast<const Base&>(s));
+    all.push_back({"guide_leaf", double(s.leaf)});
+    return all;
+}
 
 /// The ray of `path` and the surface that it met.
 template <class Mis>

@@ -18,6 +18,7 @@ template <class Mis>
 struct ReplayJoins {
     std::function<void(ReplayEye<Mis>&, const Vertex<Mis>&, const Subpath<Mis>&)> connect;
     std::function<void(ReplayEye<Mis>&)> merge;  ///< where its ray ended
+    std::function<void(Subpath<Mis>&)> start;    ///< what else its first ray knows
 };
 
 /// One eye subpath on its way.
@@ -114,7 +115,8 @@ void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::Sa
     const RandomNumbers numbers = {{out.seed, pixel, out.sample, Stream::eye}};
     ReplayEye<Mis> eye{ctx, sample_emitter, joins, details, numbers, out, EyeArrival<Mis>(ctx)};
     float tmax;
-    const auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, numbers, tmax);
+    auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, numbers, tmax);
+    if (joins.start) joins.start(first);
     replay_subpath(ctx, ctx.rules.longest(Side::eye), first, tmax, ReplayEyeSink<Mis>{eye}, details, out.eye);
     out.eye_sum = eye.arrival.sum();
 }

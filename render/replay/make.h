@@ -12,6 +12,9 @@ std::string listed(std::vector<std::string> names);
 
 struct BidirectionalMis;
 struct MergingMis;
+template <class Base>
+struct GuidedMis;
+struct GuidePolicy;
 template <class Mis>
 struct BdptPolicyOf;
 template <class Mis>
@@ -19,6 +22,9 @@ struct VcmPolicyOf;
 
 std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
                                          const BdptPolicyOf<BidirectionalMis>& policy, ReplayPairing pairing);
+std::unique_ptr<Replay> make_guided_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
+                                           const BdptPolicyOf<GuidedMis<BidirectionalMis>>& policy,
+                                           const GuidePolicy& guide);
 std::unique_ptr<Replay> make_merging_replay(const Scene& scene, const RenderSettings& settings,
                                             const HostTracer& tracer, const VcmPolicyOf<MergingMis>& policy);
 

@@ -10,6 +10,8 @@
 
 namespace ambilux {
 
+struct KeptGuide;
+
 struct ReplayRequest {
     uint32_t x = 0, y = 0;  ///< pixel of the image, from the top left
     uint32_t sample = 0;
@@ -32,6 +34,8 @@ public:
     virtual uint32_t light_subpaths() const { return 0; }
     /// Numbers below light_subpaths() have gaps where there is no whole number of light subpaths per pixel.
     virtual bool has_light_subpath(uint32_t) const { return false; }
+    /// What paths of this sample follow, where a method guides them; else null.
+    virtual std::shared_ptr<const KeptGuide> guide(uint32_t /*sample*/) const { return nullptr; }
     /// A light subpath alone and its splats anywhere on the film. Throws Error(usage) if there is none of that number.
     virtual ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
                                         std::vector<ReplayCandidate>& splats) const = 0;

@@ -21,6 +21,10 @@ namespace {
 FilmMoments one_sample(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
     const uint32_t together = renderer->iteration_samples();
+    // What a method has learned is part of a sample.
+    const bool learns = renderer->state_kind() == StateKind::per_device;
+    if (learns && sample > 0) REQUIRE(renderer->render(0, sample) == sample);
+    renderer->clear_film();
     REQUIRE(renderer->render(sample, together) == together);
     CHECK(renderer->stats().invalid.total() == 0);
     return renderer->film();
@@ -113,6 +117,13 @@ const ReplayConfig kMerging[] = {
     {"pm", "wavefront", {{"merge_samples", "4"}}},
 };
 
+const ReplayConfig kGuided[] = {
+    {"path", "guided", {{"guide_samples", "2"}, {"guide_split", "16"}, {"guide_leaves", "64"}}},
+    {"path", "guided", {{"guide_samples", "1"}, {"guide_target", "moment"}, {"estimator", "nee"}}},
+    {"bdpt", "guided", {{"guide_samples", "2"}, {"guide_split", "16"}, {"guide_leaves", "64"}}},
+    {"bdpt", "guided", {{"guide_samples", "1"}, {"heuristic", "power"}, {"rr_depth", "1"}, {"connections", "1"}}},
+};
+
 }  // namespace
 
 TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with full kernels") {
@@ -124,6 +135,19 @@ TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with
                 RenderSettings settings = settings_of(scene, c);
                 settings.specialise = specialise;
                 CHECK(check_samples(scene, settings, 5, 1) > 0);
+            }
+    }
+}
+
+TEST_CASE("A replayed guided path follows what the render had learned, after training and after iterations") {
+    for (const char* name : {"cornell", "glass", "materials"}) {
+        const Scene scene = project_scene(name, 37, 29);
+        for (const ReplayConfig& c : kGuided)
+            for (const uint32_t sample : {0u, 6u}) {
+                CAPTURE(name, text_of(c), sample);
+                RenderSettings settings = settings_of(scene, c);
+                settings.specialise = false;
+                CHECK(check_samples(scene, settings, sample, 97) > 0);
             }
     }
 }

@@ -386,7 +386,7 @@ TEST_CASE(
     CHECK(refused({"toy", "wavefront", {}}) ==
           "integrator toy: there is no replay of it; path, light, bdpt, vcm, bpm, ppm, sppm and pm have one");
     CHECK(refused({"bdpt", "learned", {}}) ==
-          "variant learned: there is no replay of it; wavefront, lvc, streaming and megakernel have one");
+          "variant learned: there is no replay of it; wavefront, lvc, guided, streaming and megakernel have one");
     CHECK(refused({"bdpt", "wavefront", {{"bdpt.auto", "true"}}}) ==
           "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that `ambilux render` "
           "printed as its selection");

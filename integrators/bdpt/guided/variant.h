@@ -16,7 +16,8 @@ struct BdptGuidedVariant : GuidedVariant {
                                               .draws_together = true,
                                               .sorts = false,
                                               .compacts = false,
-                                              .repeats = false};
+                                              .repeats = false,
+                                              .replay = ReplayPairing::cache};
 
     /// Iterations of one sample: stress renders any number of them.
     static std::vector<Stressed> stress() { return {{"bdpt-guided", {{"guide_samples", "1"}}, false}}; }

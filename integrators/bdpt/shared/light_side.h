@@ -1,8 +1,6 @@
 // Light subpaths, and what becomes of the light that they bring to the film.
 #pragma once
 
-#include <functional>
-
 #include "integrators/bdpt/shared/policy.h"
 #include "integrators/shared/subpath_queues.h"
 #include "stages/arrival.h"
@@ -94,7 +92,6 @@ struct LightStages {
     Extend<F, Tracer, Mis> extend[2];
     LightVertex<F, Mis, typename Splats::AtVertex> vertex[2];
     ConnectCameraQueue<F, Mis, typename Splats::Candidates> connect_camera;
-    uint32_t first_round = 0;  ///< random numbers of rounds before belong to others
 
     [[gnu::cold]] LightStages(const WaveParts<Tracer>& parts, const SubpathQueues<SubpathRay<Mis>>& q,
                               LightVertices<Mis> vertices, uint32_t* last_vertex, const Splats& splats,
@@ -128,23 +125,20 @@ struct LightStages {
     LightStages in_round(uint32_t round) const {
         LightStages s = *this;
         s.generate.round = round;
-        const uint32_t first_key = (first_round + round) * generate.wave.width * generate.wave.height;
+        const uint32_t first_key = round * generate.wave.width * generate.wave.height;
         s.generate.wave.first_key = s.connect_camera.wave.first_key = first_key;
         for (int k = 0; k < 2; ++k) s.extend[k].wave.first_key = s.vertex[k].wave.first_key = first_key;
         return s;
     }
 };
 
-/// `before(k, vertex)`: what else is done with the hits in place k, before stage `vertex`; `starts(generate)`: the
-/// stage that starts subpaths.
-template <class Executor, Features F, class Tracer, Fusion K, class Mis, class Before = NothingBefore,
-          class Starts = std::identity>
+/// `before(k, vertex)`: what else is done with the hits in place k, before stage `vertex`.
+template <class Executor, Features F, class Tracer, Fusion K, class Mis, class Before = NothingBefore>
 void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K, Mis>& all,
-                        const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p, Before before = {},
-                        Starts starts = {}) {
+                        const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p, Before before = {}) {
     for (uint32_t round = 0; round < p.waves.light_rounds(); ++round) {
         const auto s = all.in_round(round);
-        exec.run_slots(starts(s.generate), s.generate.wave.tiles * kTilePixels);
+        exec.run_slots(s.generate, s.generate.wave.tiles * kTilePixels);
         if (p.rules.splat) run_splats(exec, splats);
         exec.set_depth(1);
         exec.extend(s.extend[0]);

@@ -15,11 +15,6 @@ struct PathToGuide : PathIntegrator<F, Tracer, kFusion, NextEvent, NoSettings, G
         Training(const typename Path::Stages& render, const Note& note) : Path::Stages(render) {
             name_training(*this, note);
         }
-        Training of_round(uint32_t round, const GuideProgress*) const {
-            Training t = *this;
-            number_training(t, round);
-            return t;
-        }
     };
     template <bool kFused, class Executor, class Generate, class Before>
     static void wave(Executor& exec, const typename Path::Stages& s, const Generate& generate, Before before) {

@@ -36,14 +36,21 @@ AMBILUX_HD bool is_narrow(const Bsdf& b) {
 /// which a compiler may join other pairs of products and sums, and bits of a render must not depend on that.
 AMBILUX_HD float recorded_luminance(Rgb c) { return dot(c, {0.212671f, 0.715160f, 0.072169f}); }
 
-/// What a subpath knows of the guide, beside the sums of a model of weights.
-template <class Base>
+/// What a subpath knows of the guide, beside the sums of a model of weights. Vertices of bidirectional methods keep all
+/// that is theirs, in a lane that they need anyway.
+template <class Base, bool kBidirectional>
 struct GuidedSums : Base {
-    static constexpr uint32_t kVertexWords = sizeof(Base) / sizeof(float) + 1;
+    static constexpr uint32_t kVertexWords = sizeof(Base) / sizeof(float) + (kBidirectional ? 3 : 1);
 
-    uint32_t leaf;     ///< of a vertex; of a ray: where it was scattered
-    float before;      ///< of an eye ray: luminance of the throughput there
-    float whole;       ///< and after it, without roulette
+    uint32_t leaf;  ///< of a vertex; of a ray: where it was scattered
+    union {
+        float share;   ///< of a vertex: of directions that the BSDF samples there
+        float before;  ///< of an eye ray: luminance of the throughput where it was scattered
+    };
+    union {
+        float back_sa;  ///< of a light vertex: density of the way back that was learned
+        float whole;    ///< of an eye ray: luminance of the throughput after it was scattered, without roulette
+    };
     float over_pixel;  ///< 1 over what the pixel of an eye subpath is expected to be; 0: not known
 };
 
@@ -62,7 +69,7 @@ struct GuidedDirections {
     AMBILUX_HD bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s) const {
         if (mode == TransportMode::radiance) return mixed<F>(v, bsdf_share<F>(v), u, s);
         if (!BsdfDirections::sample<F>(v, u, mode, s)) return false;
-        if (!(s.flags & kScatterDelta)) s.pdf_reverse_sa = mixture<F>(v, v.scattering.wi_world, s.pdf_reverse_sa);
+        if (!(s.flags & kScatterDelta)) s.pdf_reverse_sa = way_back<F>(v, s.pdf_reverse_sa);
         return true;
     }
     template <Features F, class Mis>
@@ -73,9 +80,10 @@ struct GuidedDirections {
     /// `f`, of the BSDF, with the densities of either side.
     template <Features F, class Mis>
     AMBILUX_HD BsdfValue densities(const Vertex<Mis>& v, Vec3f wo, TransportMode mode, BsdfValue f) const {
-        const bool eye = mode == TransportMode::radiance;
-        float& pdf_sa = eye ? f.pdf_sa : f.pdf_reverse_sa;
-        pdf_sa = mixture<F>(v, eye ? wo : v.scattering.wi_world, pdf_sa);
+        if (mode == TransportMode::radiance)
+            f.pdf_sa = mixture<F>(v, wo, f.pdf_sa);
+        else
+            f.pdf_reverse_sa = way_back<F>(v, f.pdf_reverse_sa);
         return f;
     }
     /// A delta has the probability that it has in the BSDF if light comes by it, and the share of the BSDF of it if an
@@ -83,9 +91,8 @@ struct GuidedDirections {
     template <Features F, class Mis>
     AMBILUX_HD void complete(Side side, const Vertex<Mis>& v, Rgb before, Subpath<Mis>& path) const {
         const bool narrow = is_narrow<F>(v.scattering.bsdf);
-        const GuideLeaf leaf = tree.leaves[v.sums.leaf];
         if constexpr (Mis::kBidirectional)
-            if (path.delta && !narrow) path.sums.dvc *= side == Side::eye ? 1.0f / leaf.bsdf_share : leaf.bsdf_share;
+            if (path.delta && !narrow) path.sums.dvc *= side == Side::eye ? 1.0f / v.sums.share : v.sums.share;
         if (side == Side::light) return;
         path.sums.before = recorded_luminance(before);
         path.sums.whole = recorded_luminance(path.throughput);
@@ -93,20 +100,31 @@ struct GuidedDirections {
         if (roulette)
             path.roulette_scale = scale_for_roulette(
                 max_component(path.throughput),
-                narrow || path.delta ? 1.0f : path.sums.before * leaf.reflected * path.sums.over_pixel);
+                narrow || path.delta ? 1.0f
+                                     : path.sums.before * tree.leaves[v.sums.leaf].reflected * path.sums.over_pixel);
     }
 
 private:
     /// Of directions at `v`.
     template <Features F, class Mis>
     AMBILUX_HD float bsdf_share(const Vertex<Mis>& v) const {
-        return is_narrow<F>(v.scattering.bsdf) ? 1.0f : tree.leaves[v.sums.leaf].bsdf_share;
+        if (is_narrow<F>(v.scattering.bsdf)) return 1.0f;
+        if constexpr (Mis::kBidirectional)
+            return v.sums.share;
+        else
+            return tree.leaves[v.sums.leaf].bsdf_share;
     }
     /// Density with which an eye subpath leaves `v` for `d`, where the BSDF has `pdf_sa`.
     template <Features F, class Mis>
     AMBILUX_HD float mixture(const Vertex<Mis>& v, Vec3f d, float pdf_sa) const {
         const float share = bsdf_share<F>(v);
         return share < 1.0f ? fmaf(share, pdf_sa, (1.0f - share) * tree.pdf_sa(v.sums.leaf, d)) : pdf_sa;
+    }
+    /// The same of light vertex `v` and the way that its light came.
+    template <Features F, class Mis>
+    AMBILUX_HD float way_back(const Vertex<Mis>& v, float pdf_sa) const {
+        const float share = bsdf_share<F>(v);
+        return share < 1.0f ? fmaf(share, pdf_sa, (1.0f - share) * v.sums.back_sa) : pdf_sa;
     }
     /// From the BSDF with probability `share`, else from the quadtree of the leaf, in which either looks once.
     template <Features F, class Mis>
@@ -146,7 +164,7 @@ private:
 template <class Base>
 struct GuidedMis : Base {
     using Directions = GuidedDirections;
-    using Sums = GuidedSums<typename Base::Sums>;
+    using Sums = GuidedSums<typename Base::Sums, Base::kBidirectional>;
 
     GuideTree tree = {};
 
@@ -158,12 +176,23 @@ struct GuidedMis : Base {
     template <Features F, class Path, class Lights>
     AMBILUX_HD Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
                             const SurfacePoint& point) const {
-        return {Base::template sums_at<F>(scene, lights, side, path, sums, point), tree.leaf(point.p), 0.0f, 0.0f,
-                sums.over_pixel};
+        Sums s = {Base::template sums_at<F>(scene, lights, side, path, sums, point),
+                  tree.leaf(point.p),
+                  {},
+                  {},
+                  sums.over_pixel};
+        if constexpr (Base::kBidirectional) {
+            s.share = tree.leaves[s.leaf].bsdf_share;
+            if (side == Side::light && s.share < 1.0f) s.back_sa = tree.pdf_sa(s.leaf, -path.direction);
+        }
+        return s;
     }
     AMBILUX_HD Sums sums_after_scatter(const Sums& s, bool first, bool delta, float pdf_forward_sa,
                                        float pdf_reverse_sa, float cos_out) const {
-        return {Base::sums_after_scatter(s, first, delta, pdf_forward_sa, pdf_reverse_sa, cos_out), s.leaf, 0.0f, 0.0f,
+        return {Base::sums_after_scatter(s, first, delta, pdf_forward_sa, pdf_reverse_sa, cos_out),
+                s.leaf,
+                {},
+                {},
                 s.over_pixel};
     }
 };

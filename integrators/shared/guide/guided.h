@@ -12,12 +12,12 @@ namespace ambilux {
 /// `Method` renders without learning, with weights GuidedMis. It has, beside what methods have
 /// (integrators/contract.h):
 ///   Training(stages, note)        what paths outside of the image need; note(name): a record of statistics
-///   training.of_round(round, progress)   the same with random numbers that no other round has, nor the image
 ///   wave<kFused>(exec, stages or training, generate, before)   one wave; generate, kFused and before:
 ///   start_eye_subpaths
 ///                                 and repeat_depths
 template <Features F, class Tracer, Fusion kFusion, class Method>
 struct GuidedOf {
+    using Unguided = Method;
     using Mis = typename Method::Mis;
     using State = GuidedState;
     static constexpr bool kFilmWide = Method::kFilmWide;
@@ -37,6 +37,7 @@ struct GuidedOf {
         if (p.guided.iteration_samples == 0)
             p.guided.iteration_samples = iteration_samples(uint64_t(s.crop_width) * s.crop_height, settings);
         p.waves.iteration_samples = p.guided.iteration_samples;
+        p.training.until = p.guided.until;
         p.training.tiles = ((s.crop_width + kTileSide - 1) / kTileSide) * ((s.crop_height + kTileSide - 1) / kTileSide);
         const uint64_t paths = uint64_t(s.crop_width) * s.crop_height * p.guided.iteration_samples;
         while (p.training.shift < kMostShift && paths >> p.training.shift > kTrainingPaths) ++p.training.shift;
@@ -71,12 +72,12 @@ struct GuidedOf {
         GuideStep update;
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& policy, const Memory& m, const State& all)
-            : Stages(parts, m, placed(parts.scene, all), policy) {}
+            : Stages(parts, m, all.around(parts.scene), policy) {}
 
         /// Those of training round `round`: paths of random numbers that no other has, and records of their own.
         Stages of_round(uint32_t round) const {
             Stages s = *this;
-            s.train = train.of_round(round, generate_training.progress);
+            number_training(s.train, round);
             s.generate_training.wave.first_key = s.learn.wave.first_key =
                 (round + 1) * s.learn.wave.width * s.learn.wave.height;
             s.generate_training.round = round;
@@ -87,12 +88,6 @@ struct GuidedOf {
         }
 
     private:
-        static State placed(const SceneView& scene, State s) {
-            const float size = scene.bounds_radius * 1.001f;
-            s.tree.low = scene.bounds_center - Vec3f{size, size, size};
-            s.tree.inverse_side = size > 0.0f ? 0.5f / size : 0.0f;
-            return s;
-        }
         static Policy guided_by(Policy p, const State& s) {
             p.rules.directions = {s.tree, p.guided.roulette};
             p.rules.mis.tree = s.tree;
@@ -108,11 +103,13 @@ struct GuidedOf {
             generate.training = p.training;
             generate.made = m.records.made;
             static_cast<GenerateGuided<GenerateEye<F, Mis>>&>(generate_training) = generate;
+            static_cast<GenerateEye<F, Mis>&>(generate_training) = train.generate;
             generate_training.record = note("train_generate");
             generate_training.progress = s.progress;
             for (int k = 0; k < 2; ++k)
                 record[k] = {parts.wave, p.training, m.method.subpaths.hits[k],
-                             m.records,  samples,    note(RecordRays<Mis>::kName)};
+                             m.records,  samples,    note(RecordRays<Mis>::kName),
+                             s.progress};
             learn = {parts.wave, p.training, p.guided, s, m.records, samples, note(LearnRecords::kName)};
             update = {s, p.guided, note(GuideStep::kName)};
         }
@@ -167,7 +164,6 @@ void number_training(EyeStages& s, uint32_t round) {
     const uint32_t first_key = (round + 1) * s.wave.width * s.wave.height;
     const auto rekey = [&](auto&... stages) { ((stages.wave.first_key = first_key), ...); };
     rekey(s, s.extend[0], s.extend[1], s.eye_vertex[0], s.eye_vertex[1], s.connect_emitter);
-    if constexpr (requires { s.connect_vertices; }) rekey(s.connect_vertices, s.connect_deferred);
 }
 template <class EyeStages, class Note>
 void name_training(EyeStages& s, const Note& note) {

@@ -13,7 +13,10 @@ struct GuideTraining {
     static constexpr uint32_t kDepths = 8;  ///< vertices of a path that are recorded, the first ones
 
     uint32_t shift;
-    uint32_t tiles;  ///< of the film
+    uint32_t tiles;        ///< of the film
+    uint32_t until = ~0u;  ///< iterations that are learned from
+
+    AMBILUX_HD bool learns(const GuideProgress& p) const { return p.rounds < kGuideRounds || p.iterations < until; }
 
     AMBILUX_HD bool trains(const Wave& wave, uint32_t slot, uint32_t by) const {
         return ((slot ^ pick(wave, slot)) & ((1u << by) - 1)) == 0;
@@ -119,9 +122,11 @@ struct RecordRays {
     GuideRecords records;
     const Lane* samples;
     StageRecord* record;
+    const GuideProgress* progress;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         if (wave.state->depth < 2 || wave.state->depth - 2 >= GuideTraining::kDepths) return;
+        if (!training.learns(*progress)) return;
         const RayItem start = hits.items.load(i, 2).ray;  // of most no more is needed
         const uint32_t depth = start.bits.depth();
         if (start.bits.delta() || !training.trains(wave, start.path)) return;
@@ -157,7 +162,7 @@ struct LearnRecords {
     uint32_t round = kGuideRounds;
 
     AMBILUX_HD void operator()(uint32_t group) const {
-        if (state.progress->rounds != round) return;
+        if (state.progress->rounds != round || !training.learns(*state.progress)) return;
         const uint32_t slot = training.slot_of(wave, group);
         if (!training.trains(wave, slot, max(share, training.shift)) || !wave.locate(slot).active) return;
         const float brought = luminance(start_of<Rgb>(samples[slot]));
@@ -170,8 +175,10 @@ struct LearnRecords {
             const float squared = sqr(b) * q;
             if (!(squared < kInfinity)) continue;
             add(state.reflected + 2 * r.leaf, b, 1.0f / q);
-            learn_share(r, squared);
-            learn(slot, k, r,
+            if (found == 0.0f) continue;
+            const GuideQuads::Cell cell = state.tree.quads.cell(r.leaf, r.place());
+            learn_share(r, squared, cell.density);
+            learn(slot, k, r, cell,
                   settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.whole * r.pdf_sa));
         }
     }
@@ -194,35 +201,29 @@ private:
         if (units > 0.0f) fetch_add_shared(sum + 1, int64_t(min(units, kMost)));
     }
     /// What the second moment would have been with other shares of the BSDF (GuideShares).
-    AMBILUX_HD void learn_share(const GuideRecord& r, float squared) const {
+    AMBILUX_HD void learn_share(const GuideRecord& r, float squared, float density) const {
         const float units = in_units(GuideSum::moment, squared);
         if (!settings.learn_share || !(units > 0.0f)) return;
-        const GuideTree& tree = state.tree;
-        const float now = tree.leaves[r.leaf].bsdf_share;
+        const float now = state.tree.leaves[r.leaf].bsdf_share;
         if (now == 1.0f) return;
-        const float guide = kInv4Pi * tree.quads.cell(r.leaf, r.place()).density,
-                    bsdf = max(r.pdf_sa - (1.0f - now) * guide, 0.0f) / now;
+        const float guide = kInv4Pi * density, bsdf = max(r.pdf_sa - (1.0f - now) * guide, 0.0f) / now;
         for (uint32_t k = 0; k < GuideShares::kCount; ++k) {
             const float other = GuideShares::of(k), pdf_sa = other * bsdf + (1.0f - other) * guide;
             fetch_add_shared(state.shares + r.leaf * GuideShares::kCount + k,
                              int64_t(min(units * (r.pdf_sa / pdf_sa), GuideShares::kMost)));
         }
     }
-    AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, float value) const {
+    AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, GuideQuads::Cell cell, float value) const {
         const float units = min(in_units(GuideSum::target, value), kMost);
         if (!(units >= 1.0f)) return;
-        const GuideTree& tree = state.tree;
-        // Blocks of random numbers beyond those of RandomNumbers.
-        const RngKey key = wave.key(slot);
-        constexpr uint32_t kFirstBlock = 0x20000u;
-        Vec2f d = r.place();
-        GuideQuads::Cell cell = tree.quads.cell(r.leaf, d);
         if (settings.filter) {
-            const Vec4f u = random_floats(key, kFirstBlock + k);
+            // Blocks of random numbers beyond those of RandomNumbers.
+            constexpr uint32_t kFirstBlock = 0x20000u;
+            const Vec4f u = random_floats(wave.key(slot), kFirstBlock + k);
+            const Vec2f d = r.place();
             const float side = GuideQuads::side(cell.level), y = d.y + side * (u.y - 0.5f);
-            d = {clamp(d.x + side * (u.x - 0.5f), 0.0f, kOneMinusEpsilon),
-                 clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)};
-            cell = tree.quads.cell(r.leaf, d);
+            cell = state.tree.quads.cell(r.leaf, {clamp(d.x + side * (u.x - 0.5f), 0.0f, kOneMinusEpsilon),
+                                                  clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)});
         }
         const uint64_t place = (r.leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
         fetch_add_shared(state.found + place, 1);

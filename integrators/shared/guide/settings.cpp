@@ -29,6 +29,9 @@ std::vector<Declaration<GuidedSettings>> GuidedVariant::settings() {
             "k sqrt(2^k) times as many"),
         Of::number("guide_leaves", &GuidedSettings::most_leaves, 0u, 1u << 16,
                    "leaves of the tree over space, at most, of 13 KiB each; 0: 8192, of bdpt 4096"),
+        Of::number("guide_until", &GuidedSettings::until, 0u, 1u << 20,
+                   "iterations that are learned from, which takes time; later ones sample from the last trees. 0: "
+                   "training alone"),
         Of::number("guide_samples", &GuidedSettings::iteration_samples, 0u, 1024u,
                    "samples of every pixel in one iteration; training before the first takes up to twice as many. 0: "
                    "by the size of the film, so that a device has eight million paths in one, a CPU 250 thousand, but "

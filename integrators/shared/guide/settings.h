@@ -21,6 +21,7 @@ struct GuidedSettings {
     bool filter = true;              ///< what was learned is spread over the directions around it
     uint32_t split = 32;             ///< records that brought light to a leaf above which it splits, in the first round
     uint32_t most_leaves = 0;        ///< of the tree over space; 0: by the method
+    uint32_t until = 1u << 20;       ///< iterations that are learned from; trees stay as they are after them
     uint32_t iteration_samples = 0;  ///< samples of every pixel in one iteration; 0: by the size of the film
 
     static GuidedSettings plan(const RenderSettings& settings);

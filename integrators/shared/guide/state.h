@@ -4,6 +4,7 @@
 #include "integrators/kept_state.h"
 #include "integrators/shared/guide/settings.h"
 #include "integrators/shared/guide/tree.h"
+#include "scene/view.h"
 
 namespace ambilux {
 
@@ -90,6 +91,14 @@ struct GuidedState {
         s.places = layout.allocate<uint32_t>(n);
         s.scan = ScanMemory::lay_out(layout, n, size.primitives);
         s.most_leaves = n;
+        return s;
+    }
+    /// With the cube around a scene.
+    GuidedState around(const SceneView& scene) const {
+        const float size = scene.bounds_radius * 1.001f;
+        GuidedState s = *this;
+        s.tree.low = scene.bounds_center - Vec3f{size, size, size};
+        s.tree.inverse_side = size > 0.0f ? 0.5f / size : 0.0f;
         return s;
     }
     template <class Policy, class Put>
