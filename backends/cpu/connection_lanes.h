@@ -24,28 +24,32 @@ public:
     /// What `stage_` does at a vertex.
     void at(const SceneView& scene, const Rules<Mis>&, const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot,
             const RandomNumbers& numbers) {
-        if (!on_ || !rules_.connect || !v.scattering.plain_diffuse())
-            return connect_.at(scene, rules_, v, path, slot, numbers);
         if (rules_.next_event) connect_.next_event.at(scene, rules_, v, path, slot, numbers);
+        if (!rules_.connect) return;
         const FusedClock clock(connect_.record, true);
         const auto& source = connect_.source;
         const auto lights = source.search(numbers.key, path.depth, v, rules_.max_depth, slot);
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
-        const ConnectionVertex<Mis> eye = pack_connection_vertex(v, path, slot);
-        for (; found != kNone; found = lights.find(next)) {
+        const bool plain = on_ && v.scattering.plain_diffuse();
+        ConnectionVertex<Mis> eye;
+        SubpathEnd<Mis> end;
+        if (plain) eye = pack_connection_vertex(v, path, slot);
+        for (bool has_end = false; found != kNone; found = lights.find(next)) {
             connect_.record->count_item(path.depth);
+            const uint32_t k = count_;
             const ConnectionVertex<Mis> light = load_vertex<F>(source.vertices, found);
-            place_[count_] = found;
-            one_by_one_[count_].tmax = -1.0f;
-            plain_[count_] = light.bits().template diffuse<F>();
-            if (plain_[count_]) {
+            place_[k] = found;
+            plain_[k] = plain && light.bits().template diffuse<F>();
+            one_by_one_[k].tmax = -1.0f;
+            if (plain_[k]) {
                 set_rows(pairs_.eye, eye);
                 set_rows(pairs_.light, light);
             } else {
-                push_connection<F>(scene, rules_, source, *connect_.state, numbers, rounded_end<F>(scene, v, path),
-                                   slot, light, found, connect_.next_event.inner.seeds, Keep{one_by_one_[count_]},
-                                   connect_.record);
+                if (!has_end) end = rounded_end<F>(scene, v, path);
+                has_end = true;
+                push_connection<F>(scene, rules_, source, *connect_.state, numbers, end, slot, light, found,
+                                   connect_.next_event.inner.seeds, Keep{one_by_one_[k]}, connect_.record);
             }
             if (++count_ == PlainPairs::kMost) run();
         }
@@ -54,7 +58,7 @@ public:
     void run() {
         if (count_ == 0) return;
         const FusedClock clock(connect_.record);
-        plain_connections(rules_, pairs_, pairs_.padded(count_));
+        if (on_) plain_connections(rules_, pairs_, pairs_.padded(count_));
         for (uint32_t k = 0; k < count_; ++k) {
             if (plain_[k] && pairs_.origin[k].w >= 0.0f) push(k);
             if (one_by_one_[k].tmax >= 0.0f) connect_.next_event.inner.candidates.push(one_by_one_[k]);

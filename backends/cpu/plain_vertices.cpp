@@ -220,7 +220,7 @@ AMBILUX_LANES void scatters(const Rules<Mis>& rules, PlainVertices& v, uint32_t 
 
 bool has_plain_lanes() {
 #if defined(__clang__) || !defined(__x86_64__)
-    return false;  // Clang 14 makes vectors of one of these loops
+    return false;  // Clang 14 and 19 make vectors of the random numbers alone
 #elif defined(__AVX2__) && defined(__FMA__)
     return !plain_lanes_off;
 #else
