@@ -94,9 +94,11 @@ void filter_occluder(const RTCFilterFunctionNArguments* args) {
     for (unsigned i = 0; i < args->N; ++i) {
         if (args->valid[i] != -1) continue;
         const Instance* instance = instance_of(args, view, i);
-        const auto [v0, v1, v2] = detail::corners_of(view, stored_triangle(args, instance, i));
+        const Triangle tri = view.triangles[stored_triangle(args, instance, i)];
         const Vec3f o = ray_of(context, args->ray, args->N, i).o;
-        if (detail::starts_on(instance ? instance->to_group.point(o) : o, v0, v1, v2) || !accepts(args, context, i))
+        if (detail::starts_on(instance ? instance->to_group.point(o) : o, view.vertices[tri.v0].p,
+                              view.vertices[tri.v1].p, view.vertices[tri.v2].p) ||
+            !accepts(args, context, i))
             args->valid[i] = 0;
     }
 }

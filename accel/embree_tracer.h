@@ -41,16 +41,6 @@ inline const Instance* instance_at(const SceneView& view, unsigned inst_id) {
     return inst_id == RTC_INVALID_GEOMETRY_ID ? nullptr : view.instances + (inst_id - kFirstInstance);
 }
 
-struct Corners {
-    Vec3f v0, v1, v2;
-};
-/// Of a triangle that is stored: from the line of memory that shading asks for, where there are faces.
-inline Corners corners_of(const SceneView& view, uint32_t stored) {
-    if (view.faces) return {view.faces[stored].p0, view.faces[stored].p1, view.faces[stored].p2};
-    const Triangle tri = view.triangles[stored];
-    return {view.vertices[tri.v0].p, view.vertices[tri.v1].p, view.vertices[tri.v2].p};
-}
-
 /// Rays and the triangles that they met, side by side, and where they cross them.
 struct alignas(64) TriangleLanes {
     static constexpr uint32_t kWidth = 16;
@@ -182,7 +172,9 @@ private:
                     moved.dir_x[k] = d.x, moved.dir_y[k] = d.y, moved.dir_z[k] = d.z;
                 }
             }
-            const auto [v0, v1, v2] = prim == kNone ? detail::Corners{} : detail::corners_of(view, prim);
+            const Triangle tri = prim == kNone ? Triangle{} : view.triangles[prim];
+            Vec3f v0 = {0.0f, 0.0f, 0.0f}, v1 = v0, v2 = v0;
+            if (prim != kNone) v0 = view.vertices[tri.v0].p, v1 = view.vertices[tri.v1].p, v2 = view.vertices[tri.v2].p;
             lanes.v0[0][k] = v0.x, lanes.v0[1][k] = v0.y, lanes.v0[2][k] = v0.z;
             lanes.v1[0][k] = v1.x, lanes.v1[1][k] = v1.y, lanes.v1[2][k] = v1.z;
             lanes.v2[0][k] = v2.x, lanes.v2[1][k] = v2.y, lanes.v2[2][k] = v2.z;
@@ -222,7 +214,8 @@ private:
                 ray.o = instance->to_group.point(world_ray.o), ray.d = instance->to_group.vector(world_ray.d);
             }
         }
-        const auto [v0, v1, v2] = detail::corners_of(view, stored);
+        const Triangle tri = view.triangles[stored];
+        const Vec3f v0 = view.vertices[tri.v0].p, v1 = view.vertices[tri.v1].p, v2 = view.vertices[tri.v2].p;
         TriangleCrossing crossing;
         if (!intersect_triangle(ray.o, ray.d, make_ray_shear(ray.d), v0, v1, v2, ray.tmax, crossing))
             return !detail::starts_on(ray.o, v0, v1, v2);

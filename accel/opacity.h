@@ -38,9 +38,6 @@ AMBILUX_HD uint32_t opacity_id(const SceneView& scene, const Ray& ray, uint32_t 
 }
 
 AMBILUX_HD const Material& material_of(const SceneView& scene, uint32_t prim) {
-#if !defined(__CUDA_ARCH__)
-    if (scene.faces && scene.is_triangle(prim)) return scene.materials[scene.shapes[scene.faces[prim].shape].material];
-#endif
     return scene.materials[scene.shapes[scene.shape_of(prim)].material];
 }
 
