@@ -92,10 +92,12 @@ AMBILUX_HD void add_rgb(float* sum, Rgb value) {
 #endif
 }
 
-/// Asks a device for the cache line at `address`, which will be needed soon.
+/// Asks for the cache line at `address`, which will be needed soon.
 AMBILUX_HD void prefetch_line([[maybe_unused]] const void* address) {
 #if defined(__CUDA_ARCH__)
     asm volatile("prefetch.global.L2 [%0];" ::"l"(address));
+#elif defined(__GNUC__)
+    __builtin_prefetch(address, 1);
 #endif
 }
 

@@ -79,6 +79,12 @@ struct SplatSums {
         if (!alone && !gather_light(same_key(reinterpret_cast<uintptr_t>(floats + cell)), value)) return;
         add_rgb(reinterpret_cast<float*>(floats + cell), value);
     }
+    /// Asks for a cell and the next one.
+    void prefetch(uint64_t cell) const {
+        if (!doubles) return prefetch_line(floats + cell);
+        prefetch_line(doubles + cell * 3);
+        prefetch_line(doubles + cell * 3 + 5);
+    }
     AMBILUX_HD void read(uint64_t cell, double (&value)[3]) const {
         const Rgb sum = doubles ? Rgb{} : start_of<Rgb>(floats[cell]);
         for (int c = 0; c < 3; ++c) value[c] = doubles ? doubles[cell * 3 + c] : double(sum[c]);

@@ -74,25 +74,22 @@ struct LightVertexSearch {
     /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light subpath of the same
     /// slot, or, over a cache, the number of draws that are left.
     AMBILUX_HD uint32_t find(uint32_t& next) const {
-        const bool from_cache = source.from_cache();
+        const bool drawn = source.draws > 0;
         const uint32_t size = source.vertices.counter->size();
         if (size == 0 || depth + 2 > max_depth) next = kNone;
         while (next != kNone) {
             uint32_t light = next;
-            if (from_cache) light = drawn(--next, size);
+            if (drawn)
+                light = drawn_vertex<typename NumbersOf<Mis>::Points>(key, depth, --next, size, source.coherent,
+                                                                      source.draws);
             const ConnectionVertexFront y = source.vertices.items.load_front(light);
-            if (!from_cache)
+            if (!drawn)
                 next = y.link;
             else if (next == 0)
                 next = kNone;
             if (depth + y.bits.depth() + 1 <= max_depth && may_connect(y, z)) return light;
         }
         return kNone;
-    }
-
-    /// The light vertex of draw `i`.
-    AMBILUX_HD uint32_t drawn(uint32_t i, uint32_t size) const {
-        return drawn_vertex<typename NumbersOf<Mis>::Points>(key, depth, i, size, source.coherent, source.draws);
     }
 };
 

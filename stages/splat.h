@@ -87,6 +87,17 @@ struct Splat {
         if ((item.path == kNoPath) | (item.film.x != item.film.x)) return;
         for_each_film_position<F>(scene.sensor, item.film, [&](Vec2f film) { add(item, film); });
     }
+    /// Asks for the cells of item `i`, one of those to come, on a host: they lie anywhere in the film.
+    void prefetch(uint32_t i) const {
+        const SplatItem item = splats.load(i);
+        if (item.path == kNoPath || item.film.x != item.film.x) return;
+        const Sensor& sensor = scene.sensor;
+        const float x = clamp(item.film.x - float(sensor.crop_x) - 0.5f, 0.0f, float(wave.width - 1));
+        const float y = clamp(item.film.y - float(sensor.crop_y) - 0.5f, 0.0f, float(wave.height - 1));
+        const uint64_t row = uint64_t(wave.sample_of(item.path)) * wave.height + uint32_t(y);
+        sums.prefetch(row * wave.width + uint32_t(x));
+        sums.prefetch((row + 1) * wave.width + uint32_t(x));
+    }
 
 private:
     AMBILUX_HD void add(const SplatItem& item, Vec2f film) const {

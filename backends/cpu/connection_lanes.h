@@ -1,8 +1,7 @@
-// Connections of plain eye vertices in lanes: pairs with plain light vertices are gathered, computed side by side and
-// pushed in their order; others go one by one.
+// Connections of plain eye vertices in lanes: pairs with plain light vertices that face them are gathered, computed
+// side by side and pushed in their order; others go one by one.
 #pragma once
 
-#include "backends/cpu/plain_connections.h"
 #include "backends/cpu/plain_vertices.h"
 #include "stages/connect_vertices.h"
 #include "stages/subpath_numbers.h"
@@ -13,7 +12,6 @@ namespace ambilux {
 template <Features F, class EmissionOut, class Out>
 class ConnectionLanes {
     using Mis = BidirectionalMis;
-    using Source = LightVertexSource<Mis>;
 
 public:
     template <class Stage>
@@ -28,45 +26,30 @@ public:
             const RandomNumbers& numbers) {
         if (rules_.next_event) connect_.next_event.at(scene, rules_, v, path, slot, numbers);
         if (!rules_.connect) return;
-        if (!on_ || !v.scattering.plain_diffuse()) return connect_.connect(scene, rules_, v, path, slot, numbers);
         const FusedClock clock(connect_.record, true);
-        const Source& source = connect_.source;
-        const uint32_t size = source.vertices.counter->size();
-        uint32_t next = size > 0 && path.depth + 2 <= rules_.max_depth ? source.first(slot) : kNone;
-        if (next == kNone) return;
-        const Scattering& s = v.scattering;
-        const Rgb throughput = path.throughput * s.bsdf.inputs.colors[0];
-        const Vec4f eye[5] = {{v.point.p.x, v.point.p.y, v.point.p.z, bits_float(path.depth)},
-                              {s.ng.x, s.ng.y, s.ng.z, v.offset},
-                              {s.frame.n.x, s.frame.n.y, s.frame.n.z, v.sums.dvcm},
-                              {path.direction.x, path.direction.y, path.direction.z, 0.0f},
-                              {throughput.x, throughput.y, throughput.z, v.sums.dvc}};
+        const auto& source = connect_.source;
         const auto lights = source.search(numbers.key, path.depth, v, rules_.max_depth, slot);
+        uint32_t next = source.first(slot), found = lights.find(next);
+        if (found == kNone) return;
+        const bool plain = on_ && v.scattering.plain_diffuse();
+        ConnectionVertex<Mis> eye;
         SubpathEnd<Mis> end;
-        bool has_end = false;
-        while (next != kNone) {  // as LightVertexSearch::find, which tests the vertices at once
-            const uint32_t place = source.from_cache() ? lights.drawn(--next, size) : next, k = count_;
-            const ConnectionVertex<Mis> light = source.vertices.items.load(place, kLightRows);
-            if (!source.from_cache())
-                next = light.front.link;
-            else if (next == 0)
-                next = kNone;
-            slot_[k] = slot;
-            place_[k] = place;
-            one_by_one_[k].tmax = PlainPairs::kNone;
-            plain_[k] = light.bits().template diffuse<F>();
+        if (plain) eye = pack_connection_vertex(v, path, slot);
+        for (bool has_end = false; found != kNone; found = lights.find(next)) {
+            connect_.record->count_item(path.depth);
+            const uint32_t k = count_;
+            const ConnectionVertex<Mis> light = load_vertex<F>(source.vertices, found);
+            place_[k] = found;
+            plain_[k] = plain && light.bits().template diffuse<F>();
+            one_by_one_[k].tmax = -1.0f;
             if (plain_[k]) {
-                for (int row = 0; row < 5; ++row) pairs_.eye[row][k] = eye[row];
-                Vec4f rows[kLightRows];
-                memcpy(rows, &light, sizeof(rows));
-                for (uint32_t row = 0; row < kLightRows; ++row) pairs_.light[row][k] = rows[row];
-            } else if (path.depth + light.bits().depth() + 1 <= rules_.max_depth && may_connect(light.front, v)) {
+                set_rows(pairs_.eye, eye);
+                set_rows(pairs_.light, light);
+            } else {
                 if (!has_end) end = rounded_end<F>(scene, v, path);
                 has_end = true;
-                connect_.record->count_item(path.depth);
-                push_connection<F>(scene, rules_, source, *connect_.state, numbers, end, slot,
-                                   load_vertex<F>(source.vertices, place), place, connect_.next_event.inner.seeds,
-                                   Keep{one_by_one_[k]}, connect_.record);
+                push_connection<F>(scene, rules_, source, *connect_.state, numbers, end, slot, light, found,
+                                   connect_.next_event.inner.seeds, Keep{one_by_one_[k]}, connect_.record);
             }
             if (++count_ == PlainPairs::kMost) run();
         }
@@ -75,39 +58,35 @@ public:
     void run() {
         if (count_ == 0) return;
         const FusedClock clock(connect_.record);
-        constexpr uint32_t kWidth = PlainPairs::kWidth;
-        const uint32_t padded = (count_ + kWidth - 1) / kWidth * kWidth;
-        plain_connections(rules_, pairs_, padded);
-        uint32_t found = 0;
+        if (on_) plain_connections(rules_, pairs_, pairs_.padded(count_));
         for (uint32_t k = 0; k < count_; ++k) {
-            if (plain_[k]) {
-                found += pairs_.direction[k].w > 0.0f;
-                if (pairs_.origin[k].w >= 0.0f) push(k);
-            } else if (one_by_one_[k].tmax >= 0.0f) {
-                connect_.next_event.inner.candidates.push(one_by_one_[k]);
-            }
+            if (plain_[k] && pairs_.origin[k].w >= 0.0f) push(k);
+            if (one_by_one_[k].tmax >= 0.0f) connect_.next_event.inner.candidates.push(one_by_one_[k]);
         }
-        connect_.record->count_items(found, connect_.state->depth);
         count_ = 0;
     }
 
 private:
-    static constexpr uint32_t kLightRows = ConnectionVertex<Mis>::kDiffuseLanes;
-
     struct Keep {
         CandidateItem& item;
 
         void push(const CandidateItem& c) const { item = c; }
     };
 
+    void set_rows(PlainPairs::Row<Vec4f>* rows, const ConnectionVertex<Mis>& vertex) {
+        static_assert(ConnectionVertex<Mis>::kDiffuseLanes == 4);
+        Vec4f words[4];
+        memcpy(words, &vertex, sizeof(words));
+        for (int row = 0; row < 4; ++row) rows[row][count_] = words[row];
+    }
     void push(uint32_t k) const {
         const Vec4f value = pairs_.value[k], origin = pairs_.origin[k], direction = pairs_.direction[k];
-        const uint32_t eye = float_bits(pairs_.eye[0][k].w),
+        const uint32_t eye = VertexBits{float_bits(pairs_.eye[0][k].w)}.depth(),
                        light = VertexBits{float_bits(pairs_.light[0][k].w)}.depth();
         CandidateItem c = {};
         c.value = Rgb{value.x, value.y, value.z} * connect_.source.scale(*connect_.state);
         if (!is_valid_radiance(c.value, connect_.record)) return;
-        c.path = slot_[k];
+        c.path = float_bits(pairs_.eye[1][k].z);
         c.origin = {origin.x, origin.y, origin.z};
         c.tmax = origin.w;
         c.direction = {direction.x, direction.y, direction.z};
@@ -115,17 +94,17 @@ private:
         c.strategy = Strategy::make(light + 1, eye + 1);
         if (connect_.next_event.inner.seeds)
             c.opacity_seed =
-                eye_numbers(rules_.mis, stage_.wave, slot_[k])
+                eye_numbers(rules_.mis, stage_.wave, c.path)
                     .shadow_seed(connection_ray(eye, connect_.source.from_cache() ? kMaxDepth + place_[k] : light));
         connect_.next_event.inner.candidates.push(c);
     }
 
-    const NextEventAndConnections<F, Out, Source>& connect_;
+    const NextEventAndConnections<F, Out, LightVertexSource<Mis>>& connect_;
     const Rules<Mis>& rules_;
     const bool on_;
     EyeVertex<F, Mis, EmissionOut, ConnectionLanes&> stage_;
     uint32_t count_ = 0;
-    uint32_t slot_[PlainPairs::kMost], place_[PlainPairs::kMost];
+    uint32_t place_[PlainPairs::kMost];
     bool plain_[PlainPairs::kMost];
     CandidateItem one_by_one_[PlainPairs::kMost];
     PlainPairs pairs_;

@@ -123,6 +123,7 @@ public:
     void next_depth(uint32_t depths) { state_->depth += depths; }
 
 private:
+    static constexpr uint32_t kAhead = 8;  ///< items by which a stage's prefetch(i) is ahead
     using Clock = std::chrono::steady_clock;
     /// Of a launch. Stages that run inside of it have clocks of their own.
     struct Start {
@@ -147,6 +148,8 @@ private:
         const bool gaps = queue.flags && !list;
         const uint32_t n = gaps ? queue.capacity() : items;
         for (uint32_t i = 0; i < n; ++i) {
+            if constexpr (requires { stage.prefetch(i); })
+                if (!list && i + kAhead < n) stage.prefetch(i + kAhead);
             if (gaps && !claim(queue, i)) continue;
             each(list ? list[i] : i);
         }

@@ -50,8 +50,7 @@ public:
         if (count_ < kFewest) {
             for (uint32_t k = 0; k < count_; ++k) stage_(items_[k]);
         } else {
-            constexpr uint32_t kWidth = PlainVertices::kWidth;
-            const uint32_t padded = (count_ + kWidth - 1) / kWidth * kWidth;
+            const uint32_t padded = v_.padded(count_);
             plain_numbers(stage_.wave, v_, padded);
             if (stage_.rules.next_event) next_event(padded);
             plain_scatter(stage_.rules, v_, padded, smooth_);

@@ -1,17 +1,33 @@
+// Loops that GCC makes vectors of, of 16 floats with AVX-512 and else of 8 with AVX2, because all that they call is
+// inlined, early returns included, whose conditions it joins. What it needs for that: the options in
+// render/CMakeLists.txt; a function around the body, whose locals are not those of the loop; structs that are not const
+// where parts of them are copied; no bool that is one of two bools.
 #include "backends/cpu/plain_vertices.h"
 
-#include "backends/cpu/lanes.h"
-#include "items/subpath_items.h"
+#include "items/vertex_items.h"
 #include "queues/counter.h"
 #include "stages/subpath_numbers.h"
+#include "transport/subpath/connection.h"
 #include "transport/subpath/next_event.h"
 #include "transport/subpath/scatter.h"
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define AMBILUX_LANES __attribute__((flatten, target_clones("arch=x86-64-v4", "default")))
+#else
+#define AMBILUX_LANES
+#endif
 
 namespace ambilux {
 
 namespace {
 
 using Mis = UnidirectionalMis;
+
+/// What lanes know.
+constexpr Features kPlain = {bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle)};
+
+inline Vec3f vector_of(const Vec4f& v) { return {v.x, v.y, v.z}; }
+inline Vec4f with_word(const Vec3f& v, float word) { return {v.x, v.y, v.z, word}; }
 
 inline SubpathBits bits_of(const PlainVertices& b, uint32_t i) { return {float_bits(b.direction[i].w)}; }
 
@@ -145,6 +161,40 @@ inline void scatter_at(const Rules<Mis>& rules, PlainVertices& b, uint32_t i) {
     b.next_throughput[i] = with_word(path.throughput, path.sums.pdf_sa);
 }
 
+/// unpack_end() of a diffuse one. Fields one by one: a struct that is copied whole stays in memory.
+inline void load_end(const PlainPairs::Row<Vec4f>* rows, uint32_t i, SubpathEnd<BidirectionalMis>& end) {
+    Vec4f a = rows[0][i], b = rows[1][i], c = rows[2][i], d = rows[3][i];
+    const VertexBits bits = {float_bits(a.w)};
+    Scattering& s = end.vertex.scattering;
+    end.vertex.point.p = vector_of(a);
+    end.vertex.point.ng = s.ng = octahedral_decode({b.x, b.y});
+    end.vertex.offset = bits.offset();
+    end.vertex.sums.dvcm = c.w;
+    end.vertex.sums.dvc = b.w;
+    end.vertex.first = bits.depth() == 1;
+    s.frame.s = s.frame.t = {0.0f, 0.0f, 0.0f};
+    s.frame.n = octahedral_decode({d.z, d.w});
+    s.wi_world = -octahedral_decode({d.x, d.y});
+    s.wi.z = dot(s.frame.n, s.wi_world);
+    s.bsdf.type = BsdfType::diffuse;
+    s.bsdf.inputs.colors[0] = splat(1.0f);
+    s.map_rules = 0;
+    end.throughput = vector_of(c);
+    end.depth = bits.depth();
+}
+
+inline void connection_at(const Rules<BidirectionalMis>& rules, PlainPairs& b, uint32_t i) {
+    SubpathEnd<BidirectionalMis> z, y;
+    load_end(b.eye, i, z);
+    load_end(b.light, i, y);
+    Candidate<BidirectionalMis> c = {};
+    float tmax = -1.0f;
+    if (connection<kPlain>(rules, z, y, c)) tmax = c.tmax;
+    b.value[i] = with_word(c.value, c.ratio);
+    b.origin[i] = with_word(c.origin, tmax);
+    b.direction[i] = with_word(c.direction, tmax);
+}
+
 /// Parameters are copied: no store may change them.
 struct OwnWave {
     WaveState state;
@@ -170,7 +220,7 @@ AMBILUX_LANES void scatters(const Rules<Mis>& rules, PlainVertices& v, uint32_t 
 
 bool has_plain_lanes() {
 #if defined(__clang__) || !defined(__x86_64__)
-    return false;  // Clang 14 makes vectors of one of these loops
+    return false;  // Clang 14 and 19 make vectors of the random numbers alone
 #elif defined(__AVX2__) && defined(__FMA__)
     return !plain_lanes_off;
 #else
@@ -199,6 +249,13 @@ void plain_next_event(const Rules<Mis>& rules, PlainVertices& v, uint32_t count,
 
 void plain_scatter(const Rules<Mis>& rules, PlainVertices& v, uint32_t count, bool smooth) {
     smooth ? scatters<true>(rules, v, count) : scatters<false>(rules, v, count);
+}
+
+AMBILUX_LANES void plain_connections(const Rules<BidirectionalMis>& rules, PlainPairs& pairs, uint32_t count) {
+    Rules<BidirectionalMis> own = rules;
+    own.singles.on = false;  // a table that is looked at under conditions makes no vectors
+#pragma omp simd
+    for (uint32_t i = 0; i < count; ++i) connection_at(own, pairs, i);
 }
 
 }  // namespace ambilux
