@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "render/replay/guide.h"
+#include "render/replay/kept_guide.h"
 
 namespace ambilux {
 namespace {

@@ -64,9 +64,10 @@ struct Toy {
     /// What so many samples teach.
     std::vector<Lane> learned(OptimalLearning by, uint32_t samples, uint64_t seed) const {
         const StrategyLearning learning = {all, by};
-        std::vector<double> pixel(learning.words()), block = pixel;
-        for (uint32_t i = 0; i < samples; ++i) learning.add_sample(sample(i, seed), pixel.data());
-        learning.add_pixel(block.data(), pixel.data());
+        std::vector<double> pixel(learning.words()), block(learning.words() + learning.lack_words());
+        std::vector<float> lacks(learning.lack_words());
+        for (uint32_t i = 0; i < samples; ++i) learning.add_sample(sample(i, seed), pixel.data(), lacks.data());
+        learning.add_pixel(block.data(), pixel.data(), lacks.data());
         Rgb solution[EmitterStrategies::kMost];
         learning.solve(block.data(), solution);
         return lanes(solution);

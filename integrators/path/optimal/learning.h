@@ -6,12 +6,12 @@
 
 namespace ambilux {
 
-/// What samples have told is an array of doubles, whose places are the matter of DensitySums or LeastSquaresSums.
+/// What samples have told is an array of doubles and one of floats, whose places are the matter of DensitySums or
+/// LeastSquaresSums. Of several pixels both are in one array of doubles, one behind the other.
 struct StrategyLearning {
     static constexpr uint32_t kMost = EmitterStrategies::kMost;
-    static constexpr uint32_t kMostWords = DensitySums::words(kMost) > LeastSquaresSums::words(kMost)
-                                               ? DensitySums::words(kMost)
-                                               : LeastSquaresSums::words(kMost);
+    static constexpr uint32_t kMostWords = LeastSquaresSums::words(kMost) + LeastSquaresSums::lack_words(kMost);
+    static_assert(kMostWords >= DensitySums::words(kMost));
 
     EmitterStrategies all;
     OptimalLearning by;
@@ -19,12 +19,13 @@ struct StrategyLearning {
     AMBILUX_HD uint32_t words() const {
         return by_densities() ? DensitySums::words(all.count) : LeastSquaresSums::words(all.count);
     }
-    AMBILUX_HD void add_sample(const VertexStrategies& v, double* sums) const {
-        by_densities() ? DensitySums::add_sample(v, sums) : LeastSquaresSums::add_sample(v, all, sums);
+    AMBILUX_HD uint32_t lack_words() const { return by_densities() ? 0 : LeastSquaresSums::lack_words(all.count); }
+    AMBILUX_HD void add_sample(const VertexStrategies& v, double* sums, float* lacks) const {
+        by_densities() ? DensitySums::add_sample(v, sums) : LeastSquaresSums::add_sample(v, all, sums, lacks);
     }
-    AMBILUX_HD void add_pixel(double* sums, const double* pixel) const {
+    AMBILUX_HD void add_pixel(double* sums, const double* pixel, const float* lacks) const {
         by_densities() ? DensitySums::add_pixel(sums, pixel, all.count)
-                       : LeastSquaresSums::add_pixel(sums, pixel, all.count);
+                       : LeastSquaresSums::add_pixel(sums, pixel, lacks, all.count);
     }
     AMBILUX_HD void add_from_near(double* sums, const double* near) const {
         by_densities() ? DensitySums::add_from_near(sums, near, all.count)

@@ -23,10 +23,8 @@ AMBILUX_HD void optimal_variates(const VertexStrategies& v, const EmitterStrateg
 
 /// Of a pixel: number, sums of variates and of light, of products of variates, and of variates and light. Of more than
 /// one pixel: the same about the means of each, since these may differ; the number is that of the degrees of freedom.
-/// And what tells how much of the variance of the variates was seen: scales squared; for each strategy those of samples
-/// that took the rarer side of its pick, and squares of what hits of its emitters count, as next events expect them and
-/// as hits have shown them. Variates seem to have no variance before a lamp that is small, or seldom picked, was found
-/// in both ways.
+/// Beside them, variance of the variates that was not seen so far: they seem to have none before a lamp that is small,
+/// or seldom picked, was found in both ways.
 struct LeastSquaresSums {
     static constexpr uint32_t kVertices = 0, kLight = 1;
     AMBILUX_HD static constexpr uint32_t variate(uint32_t k) { return 4 + k; }
@@ -34,16 +32,14 @@ struct LeastSquaresSums {
     AMBILUX_HD static constexpr uint32_t product(uint32_t strategies, uint32_t i, uint32_t j) {
         return 4 + 4 * strategies + i * (i + 1) / 2 + j;  // j <= i
     }
-    enum Seen : uint32_t { kRarePicks, kExpectedHits, kHits, kSeenWords };
-    AMBILUX_HD static constexpr uint32_t scale_squared(uint32_t strategies) {
-        return product(strategies, strategies, 0);
+    AMBILUX_HD static constexpr uint32_t words(uint32_t strategies) { return product(strategies, strategies, 0); }
+    /// Of hits of the emitters of each strategy; where there are several, of their picks, and scales squared.
+    AMBILUX_HD static constexpr uint32_t lack_words(uint32_t strategies) {
+        return strategies > 1 ? 2 * strategies + 1 : 1;
     }
-    AMBILUX_HD static constexpr uint32_t seen(uint32_t strategies, uint32_t k, Seen what) {
-        return scale_squared(strategies) + 1 + kSeenWords * k + what;
-    }
-    AMBILUX_HD static constexpr uint32_t words(uint32_t strategies) { return seen(strategies, strategies, kRarePicks); }
 
-    AMBILUX_HD static void add_sample(const VertexStrategies& v, const EmitterStrategies& all, double* sums) {
+    AMBILUX_HD static void add_sample(const VertexStrategies& v, const EmitterStrategies& all, double* sums,
+                                      float* lacks) {
         double z[EmitterStrategies::kMost];
         optimal_variates(v, all, z);
         sums[kVertices] += 1.0;
@@ -55,14 +51,18 @@ struct LeastSquaresSums {
             for (uint32_t j = 0; j <= k; ++j) sums[product(all.count, k, j)] += z[k] * z[j];
         }
         const double nee = double(v.next_event.other), hit = double(v.hit.other), s = double(v.scale) * double(v.scale);
-        sums[scale_squared(all.count)] += s;
-        for (uint32_t k = 0; k < all.count; ++k)
-            if ((k == v.next_event_strategy) == (all.probability[k] < 0.5f)) sums[seen(all.count, k, kRarePicks)] += s;
-        // Both have the integral of the density of hits times the squared weight of next events.
-        sums[seen(all.count, v.next_event_strategy, kExpectedHits)] += s * nee * (1.0 - nee);
-        sums[seen(all.count, v.hit_strategy, kHits)] += s * hit * hit;
+        // What is expected less what is shown. Both squares have the integral of the density of hits times the squared
+        // weight of next events; the rarer side of a pick is taken with a known probability.
+        lacks[v.next_event_strategy] += float(s * nee * (1.0 - nee));
+        lacks[v.hit_strategy] -= float(s * hit * hit);
+        if (all.count == 1) return;
+        for (uint32_t k = 0; k < all.count; ++k) {
+            const bool is_rare = (k == v.next_event_strategy) == (all.probability[k] < 0.5f);
+            lacks[all.count + k] += float(s * (rare_pick(all, k) - (is_rare ? 1.0 : 0.0)));
+        }
+        lacks[2 * all.count] += float(s);
     }
-    AMBILUX_HD static void add_pixel(double* sums, const double* pixel, uint32_t strategies) {
+    AMBILUX_HD static void add_pixel(double* sums, const double* pixel, const float* lacks, uint32_t strategies) {
         const double n = pixel[kVertices];
         if (!(n > 1.0)) return;
         sums[kVertices] += n - 1.0;
@@ -73,32 +73,31 @@ struct LeastSquaresSums {
             for (uint32_t j = 0; j <= k; ++j)
                 sums[product(strategies, k, j)] += pixel[product(strategies, k, j)] - mean * pixel[variate(j)];
         }
-        for (uint32_t k = scale_squared(strategies); k < words(strategies); ++k) sums[k] += pixel[k];
+        for (uint32_t k = 0; k < lack_words(strategies); ++k) sums[words(strategies) + k] += double(lacks[k]);
     }
     /// To a block as much as some vertices near it have told, in the mean.
     AMBILUX_HD static void add_from_near(double* sums, const double* near, uint32_t strategies) {
         constexpr double kFromNear = 8.0;
         if (!(near[kVertices] > 0.0)) return;
         const double scale = min(1.0, kFromNear / near[kVertices]);
-        for (uint32_t k = 0; k < words(strategies); ++k) sums[k] += near[k] * scale;
+        for (uint32_t k = 0; k < words(strategies) + lack_words(strategies); ++k) sums[k] += near[k] * scale;
     }
     /// `advantages`: of each strategy of next event estimation over hits, as DensitySums::solve has them.
     AMBILUX_HD static void solve(const double* sums, const EmitterStrategies& all, Rgb* advantages) {
         // As if so many vertices more, whose variates have nothing to do with each other or with light, had been seen.
-        constexpr double kPrior = 4.0, kLeast = 1e-9, kSeenEnough = 0.5;
+        constexpr double kPrior = 4.0, kLeast = 1e-9;
         constexpr uint32_t kMost = EmitterStrategies::kMost;
         const uint32_t count = all.count;
         const double n = sums[kVertices], ridge = n > 0.0 ? kPrior / n : 0.0;
-        // Variance that so few samples lack: picks change the first variate and that of their strategy independently,
-        // hits both alike.
-        const auto lacking = [](double expected, double shown) {
-            return shown < kSeenEnough * expected ? expected - shown : 0.0;
-        };
+        // Variance that is lacking, where less than half was seen: picks change the first variate and that of their
+        // strategy independently, hits both alike.
+        const double* lacks = sums + words(count);
+        const auto where_more = [](double lack, double than) { return lack > than ? lack : 0.0; };
         double picks[kMost], hits[kMost], all_lacking = 0.0;
         for (uint32_t k = 0; k < count; ++k) {
-            const double p = double(all.probability[k]), rare = min(p, 1.0 - p);
-            picks[k] = lacking(rare * sums[scale_squared(count)], sums[seen(count, k, kRarePicks)]);
-            hits[k] = lacking(sums[seen(count, k, kExpectedHits)], sums[seen(count, k, kHits)]);
+            const uint32_t own = k + 1 < count ? k + 1 : 0;
+            hits[k] = where_more(lacks[k], sums[product(count, own, own)]);
+            picks[k] = count > 1 ? where_more(lacks[count + k], 0.5 * rare_pick(all, k) * lacks[2 * count]) : 0.0;
             all_lacking += picks[k] + hits[k];
         }
         const auto moment = [&](uint32_t i, uint32_t j) {
@@ -131,6 +130,12 @@ struct LeastSquaresSums {
         for (uint32_t k = 0; k < count; ++k)
             for (int c = 0; c < 3; ++c)
                 advantages[k][c] = float(solution[0][c] + (k + 1 < count ? solution[k + 1][c] : 0.0));
+    }
+
+private:
+    /// Probability of the rarer side of a pick.
+    AMBILUX_HD static double rare_pick(const EmitterStrategies& all, uint32_t k) {
+        return min(double(all.probability[k]), 1.0 - double(all.probability[k]));
     }
 };
 

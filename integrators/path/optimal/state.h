@@ -28,22 +28,27 @@ struct OptimalState {
     static constexpr uint32_t kNeighbourhood = 8;  ///< side, in pixels
 
     double* sums;  ///< [pixel][vertex][StrategyLearning], each pixel by itself: added up in the order of its samples
-    double* near;  ///< [neighbourhood][vertex][StrategyLearning]: of its pixels
+    float* lacks;  ///< the same
+    double* near;  ///< [neighbourhood][vertex][StrategyLearning, both arrays]: of its pixels
     Lane* advantages;  ///< [block][vertex][strategy]: StrategyLearning::solve
     PixelBlocks blocks, neighbourhoods;
-    uint32_t vertices, strategies, words;
+    uint32_t vertices, strategies, words, lack_words;
 
     AMBILUX_HD double* sums_of(uint32_t pixel, uint32_t vertex) const {
         return sums + (uint64_t(pixel) * vertices + vertex) * words;
     }
+    AMBILUX_HD float* lacks_of(uint32_t pixel, uint32_t vertex) const {
+        return lacks + (uint64_t(pixel) * vertices + vertex) * lack_words;
+    }
     AMBILUX_HD double* near_of(uint32_t neighbourhood, uint32_t vertex) const {
-        return near + (uint64_t(neighbourhood) * vertices + vertex) * words;
+        return near + (uint64_t(neighbourhood) * vertices + vertex) * (words + lack_words);
     }
     AMBILUX_HD Lane* advantages_of(uint32_t block, uint32_t vertex) const {
         return advantages + (uint64_t(block) * vertices + vertex) * strategies;
     }
 
     uint64_t sum_count() const { return uint64_t(blocks.width) * blocks.height * vertices * words; }
+    uint64_t lack_count() const { return uint64_t(blocks.width) * blocks.height * vertices * lack_words; }
     uint64_t advantage_count() const { return uint64_t(blocks.count()) * vertices * strategies; }
 
     template <class Policy>
@@ -54,8 +59,10 @@ struct OptimalState {
         s.vertices = p.sampling.settings.vertices;
         s.strategies = p.learning.all.count;
         s.words = p.learning.words();
+        s.lack_words = p.learning.lack_words();
         s.sums = layout.allocate<double>(s.sum_count());
-        s.near = layout.allocate<double>(uint64_t(s.neighbourhoods.count()) * s.vertices * s.words);
+        s.lacks = layout.allocate<float>(s.lack_count());
+        s.near = layout.allocate<double>(uint64_t(s.neighbourhoods.count()) * s.vertices * (s.words + s.lack_words));
         s.advantages = layout.allocate<Lane>(s.advantage_count());
         return s;
     }
@@ -64,6 +71,7 @@ struct OptimalState {
     template <class Visit>
     void for_each_saved(Visit visit) const {
         visit("optimal_sums", sums, sum_count());
+        visit("optimal_lacks", lacks, lack_count());
         visit("optimal_advantages", advantages, advantage_count());
     }
 };

@@ -58,7 +58,7 @@ struct AddOptimal {
                 const VertexStrategies vertex = records.items.load(records.place(slot, v + 1));
                 if (!(vertex.scale > 0.0f)) continue;
                 value = value + optimal_difference(vertex, learning.all, state.advantages_of(block, v)) * vertex.scale;
-                learning.add_sample(vertex, state.sums_of(p.pixel, v));
+                learning.add_sample(vertex, state.sums_of(p.pixel, v), state.lacks_of(p.pixel, v));
             }
             add(uint64_t(p.pixel) * 3, value);
             samples[slot] = {};
@@ -93,9 +93,10 @@ struct SumNeighbourhoods {
     /// The sums of the pixels of a block.
     AMBILUX_HD static void add_up(const StrategyLearning& learning, const OptimalState& state,
                                   const PixelBlocks& blocks, uint32_t block, uint32_t vertex, double* sums) {
-        for (uint32_t k = 0; k < state.words; ++k) sums[k] = 0.0;
+        for (uint32_t k = 0; k < state.words + state.lack_words; ++k) sums[k] = 0.0;
         blocks.for_pixels(block, [&](uint32_t x, uint32_t y) {
-            learning.add_pixel(sums, state.sums_of(y * blocks.width + x, vertex));
+            const uint32_t pixel = y * blocks.width + x;
+            learning.add_pixel(sums, state.sums_of(pixel, vertex), state.lacks_of(pixel, vertex));
         });
     }
 };

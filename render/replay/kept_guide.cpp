@@ -1,4 +1,4 @@
-#include "render/replay/guide.h"
+#include "render/replay/kept_guide.h"
 
 namespace ambilux {
 
