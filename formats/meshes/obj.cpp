@@ -236,6 +236,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     add_colors(in, corners, mesh);
     if (some_normals && lacks_normals) flatten_faces(mesh, corners);
     add_notes(in, mesh);
+    cutter.add_notes(mesh.notes);
     check_mesh(path, mesh);
     return mesh;
 }

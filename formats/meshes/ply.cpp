@@ -106,6 +106,7 @@ struct MeshBuilder {
         if (!corner_uvs.empty()) divide_vertices();
         if (thin_faces > 0)
             mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(thin_faces));
+        cutter.add_notes(mesh.notes);
         if (!unused.empty()) mesh.notes.push_back("the ply file has unused data: " + unused);
         check_mesh(path, mesh);
         return std::move(mesh);

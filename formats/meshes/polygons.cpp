@@ -6,7 +6,7 @@
 namespace ambilux {
 
 /// Ears: Meisters, "Polygons have ears", 1975.
-void cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles) {
+bool cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles) {
     const auto area = [&](size_t a, size_t b, size_t c) {
         return cross(corners[b] - corners[a], corners[c] - corners[a]);
     };
@@ -42,6 +42,7 @@ void cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles) {
     const auto corner = [&](size_t k) { return concave ? left[k] : uint32_t(k); };
     for (size_t k = 2; k < (concave ? left.size() : corners.size()); ++k)
         triangles.push_back({corner(0), corner(k - 1), corner(k)});
+    return left.size() <= 3;
 }
 
 }  // namespace ambilux

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/vec3d.h"
@@ -12,20 +13,22 @@ namespace ambilux {
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
 /// Numbers of the corners of triangles that cover a polygon: a fan from the first corner, or where that would reach
-/// beyond a concave polygon, its ears. What crosses itself becomes a fan. There are two triangles fewer than corners.
-void cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles);
+/// beyond a concave polygon, its ears. There are two triangles fewer than corners. False if some reach beyond it: what
+/// crosses itself, or is concave and has more than 1000 corners, becomes a fan.
+bool cut_polygon(const std::vector<Vec3d>& corners, Triangles& triangles);
 
 /// Makes faces of a mesh from polygons, one at a time. `place` of a vertex is where it lies.
 struct PolygonCutter {
     std::vector<uint32_t> polygon;  ///< vertices
     Triangles triangles;            ///< of its corners
     std::vector<Vec3d> places;      ///< of its corners
+    size_t uncovered = 0;           ///< polygons whose triangles reach beyond them
 
     template <class Place>
     void add_to(Triangles& faces, const Place& place) {
         places.clear();
         for (const uint32_t v : polygon) places.push_back(place(v));
-        cut_polygon(places, triangles);
+        uncovered += !cut_polygon(places, triangles);
         for (const auto& t : triangles) faces.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
     }
     /// The polygon of the fan from face `first` to the last one.
@@ -35,6 +38,13 @@ struct PolygonCutter {
         for (size_t i = first; i < faces.size(); ++i) polygon.push_back(faces[i][2]);
         faces.resize(first);
         add_to(faces, place);
+    }
+    void add_notes(std::vector<std::string>& notes) const {
+        if (uncovered > 0)
+            notes.push_back(
+                "concave faces that cross themselves or have more than 1000 corners are cut into fans, which "
+                "reach beyond them: " +
+                std::to_string(uncovered));
     }
 };
 

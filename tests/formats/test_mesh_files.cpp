@@ -100,11 +100,20 @@ TEST_CASE("concave polygons are covered by their triangles, from whichever corne
             }
             for (const Mesh& mesh : {read_obj("a.obj", obj, false), read_ply("a.ply", head + places + face, false),
                                      read_ply("a.ply", binary + binary_face, false)}) {
+                CHECK(mesh.notes.empty());
                 CHECK(mesh.faces.size() == n - 2);
                 CHECK(areas(mesh).first == Approx(expected[i]));
                 CHECK(areas(mesh).second == Approx(expected[i]));
             }
         }
+}
+
+TEST_CASE("concave polygons that no triangles cover are noted, with how many they are") {
+    const char* const crossed = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 2 0\nf 1 2 3 4\nf 2 3 4 1\nf 1 2 3\n";
+    const Mesh mesh = read_obj("a.obj", crossed, false);
+    CHECK(mesh.faces.size() == 5);
+    REQUIRE(mesh.notes.size() == 1);
+    CHECK(mesh.notes[0].find("are cut into fans, which reach beyond them: 2") != std::string::npos);
 }
 
 TEST_CASE("OBJ: corners of all forms, negative indices, polygons, shared vertices") {
