@@ -23,8 +23,7 @@ struct ObjReader {
     std::vector<Rgb> colors;  ///< of positions
     std::vector<Vec3f> normals;
     std::vector<Vec2f> uvs;
-    std::set<std::string> unused;  ///< what the file has beside the mesh
-    uint64_t thin_faces = 0;
+    std::set<std::string> unused;                   ///< what the file has beside the mesh
     uint64_t names_no_uv = 0, names_no_normal = 0;  ///< the first line that names one before the file has any
 
     [[noreturn]] void fail(const std::string& message) const { throw input_error(path, text.line, message); }
@@ -169,11 +168,10 @@ void note_absent(const ObjReader& in, uint64_t line, bool has_some, const char* 
     mesh.notes.push_back(std::string("faces have indices of ") + what + ", which the obj file lacks");
 }
 
-void add_notes(const ObjReader& in, Mesh& mesh) {
+void add_notes(const ObjReader& in, const PolygonCutter& cutter, Mesh& mesh) {
     note_absent(in, in.names_no_uv, !in.uvs.empty(), "texture coordinates", mesh);
     note_absent(in, in.names_no_normal, !in.normals.empty(), "normals", mesh);
-    if (in.thin_faces > 0)
-        mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(in.thin_faces));
+    cutter.add_notes(mesh.notes);
     if (in.unused.empty()) return;
     std::string list;
     for (const std::string& what : in.unused) list += (list.empty() ? "" : ", ") + what;
@@ -210,15 +208,12 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
             in.uvs.push_back({u, flip_v ? 1 - v : v});
         } else if (keyword == "f" || keyword == "fo") {
             read_polygon(in, vertex_of, corners, polygon);
-            if (polygon.size() < 3) {
-                ++in.thin_faces;
-                continue;
-            }
-            for (uint32_t v : polygon) {
-                some_normals |= corners[v].vn != kAbsent;
-                lacks_normals |= corners[v].vn == kAbsent;
-                some_uvs |= corners[v].vt != kAbsent;
-            }
+            if (polygon.size() > 2)
+                for (uint32_t v : polygon) {
+                    some_normals |= corners[v].vn != kAbsent;
+                    lacks_normals |= corners[v].vn == kAbsent;
+                    some_uvs |= corners[v].vt != kAbsent;
+                }
             cutter.add_to(mesh.faces, [&](uint32_t v) { return in.place(corners[v].v); });
             budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
         } else {
@@ -235,8 +230,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     set_positions(mesh, points);
     add_colors(in, corners, mesh);
     if (some_normals && lacks_normals) flatten_faces(mesh, corners);
-    add_notes(in, mesh);
-    cutter.add_notes(mesh.notes);
+    add_notes(in, cutter, mesh);
     check_mesh(path, mesh);
     return mesh;
 }

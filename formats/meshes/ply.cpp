@@ -74,7 +74,7 @@ struct MeshBuilder {
     const std::set<std::string>& wanted;  ///< attributes
     Mesh mesh;
     bool has_faces = false;
-    uint64_t vertices = 0, thin_faces = 0;
+    uint64_t vertices = 0;
     std::string unused = {};
     std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
     std::vector<Vec2f> corner_uvs = {};              ///< of faces up to the last one that has some
@@ -104,8 +104,6 @@ struct MeshBuilder {
         if (!points.empty()) set_positions(mesh, points);
         for (MeshAttribute& a : mesh.attributes) finish_attribute(a);
         if (!corner_uvs.empty()) divide_vertices();
-        if (thin_faces > 0)
-            mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(thin_faces));
         cutter.add_notes(mesh.notes);
         if (!unused.empty()) mesh.notes.push_back("the ply file has unused data: " + unused);
         check_mesh(path, mesh);
@@ -328,7 +326,6 @@ private:
                     property_value(p, first);
                 }
             }
-            thin_faces += cutter.polygon.size() < 3;
             cutter.add_to(mesh.faces, place);
             add_corner_uvs(first, cutter.polygon.size(), uvs);
             for (MeshAttribute& a : mesh.attributes)

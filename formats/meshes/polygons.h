@@ -22,10 +22,12 @@ struct PolygonCutter {
     std::vector<uint32_t> polygon;  ///< vertices
     Triangles triangles;            ///< of its corners
     std::vector<Vec3d> places;      ///< of its corners
+    size_t thin = 0;                ///< polygons of fewer than three corners
     size_t uncovered = 0;           ///< polygons whose triangles reach beyond them
 
     template <class Place>
     void add_to(Triangles& faces, const Place& place) {
+        if (polygon.size() < 3) return void(++thin);
         places.clear();
         for (const uint32_t v : polygon) places.push_back(place(v));
         uncovered += !cut_polygon(places, triangles);
@@ -40,6 +42,7 @@ struct PolygonCutter {
         add_to(faces, place);
     }
     void add_notes(std::vector<std::string>& notes) const {
+        if (thin > 0) notes.push_back("faces of fewer than three corners are left out: " + std::to_string(thin));
         if (uncovered > 0)
             notes.push_back(
                 "concave faces that cross themselves or have more than 1000 corners are cut into fans, which "
