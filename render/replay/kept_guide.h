@@ -34,6 +34,7 @@ struct KeptGuide {
     }
 };
 
+/// Makes the trees that samples of a render follow, and keeps the last ones.
 class ReplayedGuide {
 public:
     ReplayedGuide(const Scene& scene, const RenderSettings& settings, const GuidePolicy& policy)

@@ -57,12 +57,7 @@ TEST_CASE("Connections and light tracing alone, and stages with queues of their 
     apply_setting(own, "strategies", "connections+light");
     own.max_depth = 4;
     check_agreement(scene, own, 256, paired, 0.06);
-    own.specialise = false;
-    const RenderResult fused = render_scene(scene, own, 5);
-    own.fuse = Fuse::none;
-    const RenderResult staged = render_scene(scene, own, 5);
-    CHECK(fused.film.sum == staged.film.sum);
-    CHECK(fused.film.sum_squares == staged.film.sum_squares);
+    check_stages_of_their_own(scene, own, 5);
 }
 
 TEST_CASE("With the same number for all pixels images are those of lvc, sample by sample") {

@@ -103,13 +103,7 @@ TEST_CASE(
         const Scene scene = project_scene(name, 48, 32);
         for (const char* variant : {"wavefront", "lvc", "streaming"}) {
             INFO(name << " " << variant);
-            RenderSettings s = variant_settings(scene, variant);
-            s.specialise = false;  // stages of their own hold all features
-            const RenderResult fused = render_scene(scene, s, 3);
-            s.fuse = Fuse::none;
-            const RenderResult staged = render_scene(scene, s, 3);
-            CHECK(fused.film.sum == staged.film.sum);
-            CHECK(fused.film.sum_squares == staged.film.sum_squares);
+            const auto [fused, staged] = check_stages_of_their_own(scene, variant_settings(scene, variant), 3);
             CHECK(fused.stats.rays_occlude == staged.stats.rays_occlude);
             CHECK(fused.stats.memory_bytes < staged.stats.memory_bytes);
             const auto weighs = [](const RenderResult& r) {

@@ -78,12 +78,7 @@ TEST_CASE("learned draws of connections alone, for both heuristics and over stag
         learned.variant = "learned";
         learned.seed = 32;
         check_agreement(scene, learned, 256, paired, 0.06);
-        learned.specialise = false;
-        const RenderResult fused = render_scene(scene, learned, 5);
-        learned.fuse = Fuse::none;
-        const RenderResult staged = render_scene(scene, learned, 5);
-        CHECK(fused.film.sum == staged.film.sum);
-        CHECK(fused.film.sum_squares == staged.film.sum_squares);
+        check_stages_of_their_own(scene, learned, 5);
     }
 }
 

@@ -194,7 +194,7 @@ TEST_CASE("What is learned depends on no thread and no size of waves, and a stop
     check_resumes_from_state(scene, s, one);
 }
 
-TEST_CASE("Scenes without light, without surfaces that scatter, and paths of few segments") {
+TEST_CASE("Paths of few segments") {
     for (const int depth : {0, 1, 2, 3}) {
         const Scene scene = project_scene("cornell", 16, 16);
         RenderSettings s = guided(scene, 5);

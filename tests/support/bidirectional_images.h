@@ -239,4 +239,16 @@ inline void agree(const Scene& scene, const std::vector<Method>& methods, uint32
     }
 }
 
+/// Of stages that are fused, and of stages of their own, which hold all features: the same bits.
+inline std::pair<RenderResult, RenderResult> check_stages_of_their_own(const Scene& scene, RenderSettings s,
+                                                                       uint32_t spp) {
+    s.specialise = false;
+    const RenderResult fused = render_scene(scene, s, spp);
+    s.fuse = Fuse::none;
+    const RenderResult staged = render_scene(scene, s, spp);
+    CHECK(fused.film.sum == staged.film.sum);
+    CHECK(fused.film.sum_squares == staged.film.sum_squares);
+    return {fused, staged};
+}
+
 }  // namespace ambilux
