@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Rebuilds claims of papers, by default those of experiments/claims (docs/extending.md, "A claim of a paper"). docs/claims.md: scripts/evidence.sh.
-#   scripts/claims.sh [run|page] [--only NAME ...] [-o FOLDER] [--claims FOLDER]   both steps, or one: running needs the program and Python alone, on a device an estimated 18 minutes
+#   scripts/claims.sh [run|page] [--only NAME ...] [-o FOLDER] [--claims FOLDER]   both steps, or one: running needs the program and Python alone, on a device an estimated 17 minutes
 #   scripts/claims.sh --quick                                                     every claim small, at most five minutes on two cores, into out/claims-quick
 # Goes on where it stopped. Folders are seen from where it is called. AMBILUX names the program, such as a packed one (scripts/bundle.sh): "ambilux/run.sh ambilux".
 from=$PWD

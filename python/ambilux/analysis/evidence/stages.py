@@ -35,16 +35,16 @@ SHOWN = ("overview", "convergence_time_relmse", "convergence_spp", "stage_times"
 CAUSTIC = ("water-caustic",)
 PEERS = ("agreement", "samples", "errors", "ratios")
 STAGES = (
-    Stage("results", "results.md", 420, experiment="experiments/results.toml", kinds=("table", "further", "remarks"),
+    Stage("results", "results.md", 260, experiment="experiments/results.toml", kinds=("table", "further", "remarks"),
           figures=SHOWN, pictures=("glass",)),
     Stage("results_switches", "results.md", 150, experiment="experiments/results_switches.toml",
           kinds=("table", "further", "remarks"), figures=("ablation",)),
     Stage("rays", "performance.md", 140, parts=benches.rays, tables=benches.rays_tables),
     Stage("stages", "performance.md", 160, parts=benches.stages, tables=benches.stages_tables),
-    Stage("peers_device", "peers.md", 560, experiment="experiments/peers_device.toml", kinds=PEERS, spread=CAUSTIC,
+    Stage("peers_device", "peers.md", 270, experiment="experiments/peers_device.toml", kinds=PEERS, spread=CAUSTIC,
           figures=("convergence_time_relmse",)),
-    Stage("auto", "performance.md", 480, experiment="experiments/auto.toml", kinds=("errors",), spread=CAUSTIC),
-    Stage("claims", "claims.md", 1300),
+    Stage("auto", "performance.md", 240, experiment="experiments/auto.toml", kinds=("errors",), spread=CAUSTIC),
+    Stage("claims", "claims.md", 1000),
     Stage("switches_path", "performance.md", 160, experiment="experiments/switches_path.toml", kinds=("switches",)),
     Stage("switches_bdpt", "performance.md", 250, experiment="experiments/switches_bdpt.toml", kinds=("switches",)),
     Stage("frames", "performance.md", 60, parts=benches.frames, tables=benches.frames_tables),
