@@ -129,6 +129,8 @@ void read_model(Context& context, const std::string& path) {
         context.fail("it is not valid glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     if (!context.model.asset.version.starts_with("2"))
         context.fail("it is glTF " + context.model.asset.version + ", not 2.0");
+    if (const std::string& least = context.model.asset.minVersion; !least.empty() && least != "2.0")
+        context.fail("it asks for glTF " + least + ", which is not supported: 2.0 is");
     unpack_views(context);
     context.image_bytes.resize(context.model.images.size());
     image_views(context);

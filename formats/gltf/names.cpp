@@ -64,6 +64,11 @@ const std::map<std::string, std::string> kNames = {
     {"KHR_node_visibility", "visible"},
     {"KHR_texture_transform", "offset rotation scale texCoord"}};
 
+/// Properties whose values are texts; those of all others that kNames has are numbers, objects or lists of either.
+const document::Plugins kTexts = {"copyright", "generator",  "version",       "minVersion",        "type",   "uri",
+                                  "mimeType",  "alphaMode",  "mode",          "extensionsUsed",    "filter", "name",
+                                  "extras",    "targetPath", "interpolation", "extensionsRequired"};
+
 bool is_extension(std::string_view kind) { return kind.starts_with("KHR_") || kind.starts_with("EXT_"); }
 
 struct Kind {
@@ -126,8 +131,19 @@ private:
         if (escapes)
             if (const auto plain = nlohmann::json::parse('"' + key + '"', nullptr, false); plain.is_string())
                 key = plain;
-        next = kind_inside(around.back(), key);
+        const Kind* of = around.back();
+        next = kind_inside(of, key);
+        const size_t value = json.find_first_not_of(" \t\r\n[", behind + 1);
+        if (of && of != &kExtensions && value != std::string_view::npos && json[value] == '"' && has(*of, key) &&
+            !document::is_one_of(kTexts, key))
+            context.fail(fmt::format("property '{}' of {} is a text, not a number", key, called(*of)));
         return end;
+    }
+
+    static std::string called(const Kind& kind) { return kind.name == "map" ? "a texture" : kind.name; }
+    static bool has(const Kind& kind, const std::string& key) {
+        return std::any_of(kind.properties.begin(), kind.properties.end(),
+                           [&](const auto& p) { return p.first == key; });
     }
 
     const Kind* kind_inside(const Kind* of, const std::string& key) {
@@ -142,8 +158,8 @@ private:
         if (key == "extensions") return &kExtensions;
         document::Plugins names;
         for (const auto& property : of->properties) names.push_back(property.first);
-        context.note(fmt::format("property '{}' of {} is not known and left out{}", key,
-                                 of->name == "map" ? "a texture" : of->name, suggestion(names, key)));
+        context.note(
+            fmt::format("property '{}' of {} is not known and left out{}", key, called(*of), suggestion(names, key)));
         return nullptr;
     }
 };
