@@ -57,7 +57,7 @@ Declaration<S> light_paths() {
         s.light_subpaths_per_tile = uint32_t(per_tile);
     };
     return {key, fmt::format("{} in multiples of 1/{}", allowed_numbers(kLeast, kMost), kTilePixels),
-            "light subpaths per pixel; with connections in the variants lvc and learned only", set,
+            "light subpaths per pixel; in bdpt: lvc, aware, learned, guided, and wavefront without connections", set,
             [](const S& s) -> SettingValue { return float(s.light_subpaths_per_tile) / kTilePixels; }};
 }
 
