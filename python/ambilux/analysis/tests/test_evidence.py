@@ -120,7 +120,7 @@ def test_age_counts_commits_of_device_code(tmp_path):
         (tmp_path / "stages" / "a").write_text(str(i))
         git("add", "-A")
         git("commit", "-q", "-m", str(i))
-    assert data.age(first, tmp_path) == "older than 50 commits of device code"
+    assert data.age(first, tmp_path) == "more than 50 commits of device code behind"
     assert data.age("0" * 12, tmp_path) == "of a revision that this repository does not have"
     assert data.age("unknown", tmp_path) == "of a revision that was not recorded"
 
@@ -135,7 +135,7 @@ def made(tmp_path, noise, **changes):
     return replace(results, rows=rows, kept={})
 
 
-STAGE = stages.Stage("s", "results.md", 1, kinds=("table", "further", "errors", "ratios", "samples", "switches"))
+STAGE = stages.Stage("s", "results.md", 1, "Results", kinds=("table", "further", "errors", "ratios", "samples", "switches"))
 
 
 def test_errors_are_shown_where_the_reference_is_ten_times_better(tmp_path, monkeypatch):
@@ -160,7 +160,7 @@ def test_without_a_reference_the_spread_over_seeds_stands_for_errors(tmp_path):
     spread = [{"scene": "box", "run": "a", "seeds": 3, "relmse": 0.25, "rmse": 0.5}]
     blocks = collect.blocks(results, stage, spread)
     assert [row[1] for row in blocks["errors"]["rows"]] == ["(0.250)", None]
-    assert "no method makes a reference" in blocks["references"]["list"][0]
+    assert "no method gives a converged reference" in blocks["references"]["list"][0]
     assert all(c is None for row in blocks["ratios"]["rows"] for c in row[1:])
     assert all(math.isfinite(x.relmse.value) for x in summary.lines(results))
 
@@ -188,7 +188,7 @@ def place(tmp_path):
 
 def bench_stage(*names):
     parts = [benches.part("k", "box", name, ["ambilux", name, "OUT/x"]) for name in names]
-    return stages.Stage("rays", "p.md", 1, parts=lambda place: parts, tables=lambda results: {"k": benches.by_scene(results, "k", names, lambda of: [len(of(n) or []) for n in names])})
+    return stages.Stage("rays", "p.md", 1, "Rays", parts=lambda place: parts, tables=lambda results: {"k": benches.by_scene(results, "k", names, lambda of: [len(of(n) or []) for n in names])})
 
 
 def test_a_stage_goes_on_where_it_stopped_and_says_what_failed(tmp_path, place):
