@@ -136,6 +136,6 @@ def marked(stage, name, lines):
 
 def sources(stored):
     """Where every table is from: one revision and one kind of card, or which are of others."""
-    rows = [[stages.BY_NAME[name].link, s["source"]["revision"], s["source"]["card"], s["source"]["date"].split(" ")[0], s["source"].get("old", "")]
+    rows = [[f"{stages.BY_NAME[name].link}, `{name}`", s["source"]["revision"], s["source"]["card"], s["source"]["date"].split(" ")[0], s["source"].get("old", "")]
             for name, s in stored.items()]
-    return block_lines({"columns": ["tables", "revision", "machine", "date", "old"], "rows": rows})
+    return block_lines({"columns": ["tables, stage", "revision", "machine", "date", "old"], "rows": rows})
