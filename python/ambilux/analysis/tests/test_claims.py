@@ -185,6 +185,13 @@ def test_the_page_says_what_is_evidence(tmp_path):
     assert "Verdict: **" not in small and not (tmp_path / "none").exists()
 
 
+def test_scenes_that_are_newer_than_the_data_are_named(tmp_path):
+    o = outcome_of(tmp_path)
+    stored = page.stored(o, tmp_path)
+    (later,) = registry.load(write_claim(tmp_path / "claims", more='[[compare]]\nscene = "away"\nrun = "a"\nover = "b"\n'))
+    assert page.newer_scenes(later, stored) == ["away"] and page.newer_scenes(o.claim, stored) == []
+
+
 def test_the_projects_page_names_every_claim():
     text = (ROOT / "docs" / "claims.md").read_text(encoding="utf-8")
     assert [c.title for c in registry.load(PROJECT) if f"## {c.title}\n" not in text] == []

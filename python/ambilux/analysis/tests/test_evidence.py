@@ -55,6 +55,7 @@ def test_one_revision_and_one_kind_of_card_unless_the_pages_say_otherwise():
 def test_every_stage_is_on_its_page_and_its_files_are_there(stage):
     page = (DOCS / stage.page).read_text(encoding="utf-8")
     shown = {name for of, name, _ in data.BLOCK.findall(page) if of == stage.name}
+    assert f"# {stage.section}\n" in page
     if stage.experiment:
         assert shown >= set(stage.kinds), stage.name
         text = (ROOT / stage.experiment).read_text(encoding="utf-8")
@@ -106,6 +107,13 @@ def test_a_changed_figure_is_found():
     found["blocks"]["table"]["rows"][0][2] = "12345678"
     page = stages.BY_NAME[name].page
     assert pages.texts(ROOT, DOCS, stored)[page] != (DOCS / page).read_text(encoding="utf-8")
+
+
+def test_one_sample_has_a_row_for_each_method():
+    found = {"frames_per_second": 226.2, "percentile_95_seconds": 0.00481, "memory_bytes_peak": 498 << 20}
+    results = [{"kind": "frames", "scene": "box", "key": method, "json": found} for method in ("path", "streaming")]
+    lines = data.block_lines(benches.frames_tables(results)["frames"])
+    assert lines[2:] == ["| box | path | 226 | 4.8 | 498 |", "|  | streaming | 226 | 4.8 | 498 |"]
 
 
 def test_age_counts_commits_of_device_code(tmp_path):
