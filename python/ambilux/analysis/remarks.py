@@ -62,11 +62,11 @@ def same_remarks(lines, experiment=None):
         elif verdicts.differs(line, lines):
             said = told
         elif r.low <= 1 <= r.high:
-            said = f"no effect on time per sample found: {told}"
+            said = f"no effect on the time per sample found (ratio {1 / r.value:.3g} [{1 / r.high:.3g}, {1 / r.low:.3g}])"
         else:
             said = f"{told}; 1 is outside of the interval, but {line.seeds} seeds are too few to claim a difference at the level of all statements"
         yield (f"{line.scene}, {line.run}: the same images at equal seeds as the base run; {said}"
-               + ("; its settings are those of the base run, so that the difference shows how far times can be trusted" if anyway else ""))
+               + ("; on this scene the setting equals the default, so that the difference shows the accuracy of the times" if anyway else ""))
 
 
 def sets_nothing(experiment, scene, run):
@@ -164,7 +164,7 @@ def remarks(experiment, lines):
         if broken:
             found.append(f"{place}: the error of {broken} checkpoints is NaN or infinite; they are left out of figures and means")
         if line.bias_z > threshold:
-            found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; chance exceeds {threshold:.1f} in less than 1 % of reports")
+            found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; |z| above {threshold:.1f} occurs by chance in less than 1 % of reports")
         elif line.bias and line.bias.p < verdicts.limit(lines):
             found.append(f"{place}: the mean over seeds differs from the reference's by {line.bias.estimate.value:+.2e} ± {line.bias.estimate.error:.1e}, "
                          "noise of the reference included; chance does that in less than 1 % of reports")

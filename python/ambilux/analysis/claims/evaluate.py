@@ -118,7 +118,7 @@ def said(compare, j):
     if j.high < compare.above:
         return "not", f"{tables.interval(j)} is below {compare.above:g}"
     if not j.low > compare.above:
-        return "undecided", f"{tables.interval(j)} holds {compare.above:g}"
+        return "undecided", f"{tables.interval(j)} contains {compare.above:g}"
     if compare.published and j.high < compare.published[0]:
         return "in part", f"{tables.interval(j)} ends below the published {compare.published[0]:g}"
     return "reproduced", tables.interval(j)

@@ -11,22 +11,24 @@ from ambilux.analysis.evidence import data
 
 HEAD = """# Published claims
 
-What papers say, beside what this program measures. Written by a script from the files in {folder} and from results; do
-not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
+This page compares what papers claim with what Ambilux measures. A script writes it from the files in {folder} and from
+results; do not edit it. [How to add a claim]({docs}extending.md#a-claim-of-a-paper).
 
-A ratio says how many times as good the first run of a comparison is as the second: *at equal time* error times time of
-the second over that of the first, *at equal samples* error of the second over that of the first, *of rates* rate of the
-first over that of the second. Brackets are 95 % intervals, made as those of
-[analysis]({docs}analysis.md#how-numbers-are-made). With the measure that the paper uses a comparison is
+Each comparison states a ratio that is above 1 where its first run is better. *At equal time* it is error times time of
+the second run over that of the first, *at equal samples* error of the second over that of the first, *of rates* rate of
+the first over that of the second. Brackets are 95 % intervals, made as those of
+[analysis]({docs}analysis.md#how-numbers-are-made). The measure that the paper uses decides. A comparison is
 
-- **reproduced** where the interval lies above 1 (or what the column *published* says) and, where the paper states a
-  value, reaches this value,
-- **in part** where the interval lies above 1 and ends below the published value; of several comparisons, where some
-  hold,
-- **not** where the interval lies below 1,
-- **undecided** where the interval holds 1, or where the data cannot support an interval.
+- **reproduced**: the whole interval lies above 1 (or above the bound in column *published*) and, if the paper states a
+  value, the interval reaches this value or exceeds it,
+- **in part**: the interval lies above 1 and ends below the published value,
+- **not**: the interval lies below 1 (or below that bound),
+- **undecided**: the interval contains 1 (or that bound), or the data support no interval.
 
-`scripts/claims.sh` repeats all of them, and `--quick` makes them small. **A small run is no evidence.** It shows that the
+A claim with several comparisons has their common verdict; if they differ, it is *in part* where at least one holds
+(reproduced or in part), else *not*.
+
+`scripts/claims.sh` runs all claims, with `--quick` at small size. **A small run is no evidence**; it only shows that a
 claim can be run.
 """
 NOT_RUN = {"says": "not run", "verdict": "not run", "why": "there are no data of it yet", "full": False, "columns": [], "rows": [],
@@ -49,7 +51,7 @@ def published_text(compare):
 
 
 def ratio_cell(j):
-    return None if j is None else data.judged(j, mark=f" ({j.doubt})" if j.doubt else "")
+    return None if j is None else data.judged(j, mark=f" (no interval: {j.doubt})" if j.doubt else "")
 
 
 def table(outcome):
@@ -107,6 +109,12 @@ def stored(outcome, images):
             "rows": rows, "left_out": list(outcome.left_out), "picture": picture(outcome, images) or "", "facts": list(facts(outcome))}
 
 
+def newer_scenes(claim, found):
+    """Scenes of the claim of which the data know nothing."""
+    known = {row[0].split(", ")[0] for row in found["rows"]} | set(found["left_out"])
+    return list(dict.fromkeys(c.scene for c in claim.compares if c.scene not in known))
+
+
 def section(claim, found, images):
     link = f", [doi:{claim.doi}](https://doi.org/{claim.doi})" if claim.doi else ""
     yield from [f"## {claim.title}", "", f"{claim.paper}{link}.", ""]
@@ -116,7 +124,9 @@ def section(claim, found, images):
     if found["rows"]:
         yield from [*data.block_lines(found), ""]
     if found["left_out"]:
-        yield from [f"Left out, since they are not there: {', '.join(found['left_out'])}.", ""]
+        yield from [f"Scenes that were not found, left out: {', '.join(found['left_out'])}.", ""]
+    if found["rows"] and (newer := newer_scenes(claim, found)):
+        yield from [f"Scenes that the claim has since these data were made: {', '.join(newer)}.", ""]
     if found["picture"]:
         yield from [f"![{claim.title}: {claim.picture}]({images}/{found['picture']})", ""]
     yield from ["What differs from the paper:", "", *(f"- {d}" for d in claim.differs), ""]
@@ -134,10 +144,12 @@ def markdown(claims, blocks, images, root, told=()):
     docs = os.path.normpath(os.path.relpath("docs", root) + "/x")[:-1]
     lines = [HEAD.format(folder=f"[{claims[0].file.parent.resolve().name}]({folder})", docs=docs),
              f"{len(claims)} claims, {len(full)} run at full size.{counts}", *told, "",
-             "| claim | paper | kind | verdict |", "| --- | --- | --- | --- |"]
+             "| claim | paper | kind | verdict | small run (no evidence) |", "| --- | --- | --- | --- | --- |"]
     for claim in claims:
         anchor = re.sub(r"[^\w -]", "", claim.title.lower()).replace(" ", "-")
         year = re.search(r"\b(?:19|20)\d\d\b", claim.paper)
         authors = claim.paper[:year.end()] if year else claim.paper
-        lines.append(f"| [{claim.title}](#{anchor}) | {authors} | {claim.kind} | {blocks[claim.name]['verdict']} |")
+        found = blocks[claim.name]
+        verdicts = f"{found['verdict']} |  |" if found["full"] else f"not run on a device | {found['says'] if found['rows'] else ''} |"
+        lines.append(f"| [{claim.title}](#{anchor}) | {authors} | {claim.kind} | {verdicts}")
     return "\n".join([*lines, "", *(text for c in claims for text in section(c, blocks[c.name], where))]).rstrip("\n") + "\n"

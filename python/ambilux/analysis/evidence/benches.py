@@ -83,7 +83,7 @@ def rays_tables(results):
         bench = of("opaque")
         found = rates(bench)
         return [f"{bench['accel_bytes'] / 1e6:.3g} MB, {bench['build_seconds']:.2f} s", *(found.get(b) for b in OPAQUE)]
-    return {"opaque": by_scene(results, "rays", ("structure", *OPAQUE), alone),
+    return {"opaque": by_scene(results, "rays", ("structure: size, build time", *OPAQUE), alone),
             "masks": by_scene(results, "rays", ALL, lambda of: [rates(of("masks")).get(b) for b in ALL])}
 
 
@@ -129,12 +129,9 @@ def frames(place):
 
 
 def frames_tables(results):
-    def cells(of):
-        for method in METHODS:
-            if found := of(method):
-                yield (f"{found['frames_per_second']:.0f}, {1000 * found['percentile_95_seconds']:.1f}, "
-                       f"{found['memory_bytes_peak'] >> 20}")
-    return {"frames": by_scene(results, "frames", [m for m in METHODS if m != "megakernel"], cells)}
+    rows = [[r["scene"], r["key"], f"{r['json']['frames_per_second']:.0f}", f"{1000 * r['json']['percentile_95_seconds']:.1f}",
+             str(r["json"]["memory_bytes_peak"] >> 20)] for r in results if r["kind"] == "frames"]
+    return {"frames": table(["scene", "method", "images per second", "95th percentile, ms", "peak MiB"], rows) | {"grouped": True}}
 
 
 WAVES = ("path", "wavefront", "lvc, 1 connection", "streaming")
@@ -152,7 +149,7 @@ def waves_tables(results):
     def cells(of):
         found = [of(m) for m in WAVES]
         return [*(r["spp"] / r["seconds"]["render"] for r in found), ", ".join(f"{r['memory_bytes_peak'] / 1e9:.1f}" for r in found)]
-    return {"waves": by_scene(results, "waves", (*WAVES, "GB of each"), cells)}
+    return {"waves": by_scene(results, "waves", (*WAVES, "GB: path, wavefront, lvc, streaming"), cells)}
 
 
 # Builders of structures
@@ -196,7 +193,7 @@ def optix_tables(results):
     def cells(of):
         own, other = of("own"), of("optix")
         return [*(f"{x['accel_bytes'] / 1e6:.3g} MB, {x['build_seconds']:.2f} s" for x in (own, other)), *ratios_of_rates(own, other)]
-    return {"rates": by_scene(results, "optix", ("cwbvh", "OptiX", "ratio of rates, mean", "minimum"), cells)}
+    return {"rates": by_scene(results, "optix", ("cwbvh: size, build time", "OptiX: size, build time", "ratio of rates, mean", "minimum"), cells)}
 
 
 # Several devices
@@ -223,9 +220,10 @@ def devices_tables(results):
         plain, ranges, every = [[of(f"{key} {turn}")["seconds"]["render"] for turn in (1, 2)] for key in ("plain", "ranges", "all")]
         count = len(of("all 1").get("workers", [])) or 1
         return [min(plain), ", ".join(f"{s:.2f}" for s in ranges), count, ", ".join(f"{s:.2f}" for s in every), f"{min(plain) / (count * min(every)):.2f}"]
-    columns = ("plain", "by ranges, one device", "devices", "all devices", "efficiency")
+    columns = ("plain, s", "by ranges, one device, s", "number of devices", "all devices, s", "efficiency")
     compared = [r["json"] for r in results if r["key"] == "compare"]
-    return {"devices": by_scene(results, "devices", columns, cells),
+    of_renders = by_scene(results, "devices", columns, cells)
+    return {"devices": of_renders | {"columns": ["render", *columns]},
             "bits": table(["deterministic images of one device and of all", "RMSE between them"], [[GLASS, c["rmse"]] for c in compared])}
 
 

@@ -43,7 +43,7 @@ def reference_variance(experiment, scene):
 def unfit(experiment, scene, stage):
     """Why no errors against the scene's reference are shown; empty if they are."""
     if scene in stage.spread:
-        return "no method makes a reference: how much images of seeds differ stands in place of errors"
+        return "no method gives a converged reference: relMSE between images of different seeds stands in place of errors"
     noise, spp, (most, variance) = noise_share(experiment, scene), reference_spp(experiment, scene), longest(experiment, scene)
     if not noise <= NOISE:
         return f"the variance of its reference is {noise:.2g} of the least relMSE, more than {NOISE:g}: no errors are shown"

@@ -12,6 +12,7 @@ import re
 import subprocess
 
 from ambilux.analysis import tables
+from ambilux.analysis.evidence import stages
 from ambilux.analysis.experiment import InputError
 
 FOLDER = "docs/data"
@@ -68,7 +69,7 @@ def age(revision, root):
     if git("cat-file", "-e", f"{revision}^{{commit}}").returncode:
         return "of a revision that this repository does not have"
     count = int(git("rev-list", "--count", f"{revision}..HEAD", "--", *DEVICE_CODE).stdout or 0)
-    return f"older than {OLD} commits of device code" if count > OLD else ""
+    return f"more than {OLD} commits of device code behind" if count > OLD else ""
 
 
 def knows_history(root):
@@ -135,6 +136,6 @@ def marked(stage, name, lines):
 
 def sources(stored):
     """Where every table is from: one revision and one kind of card, or which are of others."""
-    rows = [[f"{stage}.json", s["source"]["revision"], s["source"]["card"], s["source"]["date"].split(" ")[0], s["source"].get("old", "")]
-            for stage, s in stored.items()]
-    return block_lines({"columns": ["data", "revision", "machine", "date", "old"], "rows": rows})
+    rows = [[f"{stages.BY_NAME[name].link}, `{name}`", s["source"]["revision"], s["source"]["card"], s["source"]["date"].split(" ")[0], s["source"].get("old", "")]
+            for name, s in stored.items()]
+    return block_lines({"columns": ["tables, stage", "revision", "machine", "date", "old"], "rows": rows})

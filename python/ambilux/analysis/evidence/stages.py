@@ -4,6 +4,7 @@ Needs Python's standard library alone.
 """
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,7 @@ class Stage:
     name: str
     page: str  # in docs/
     seconds: int
+    section: str  # heading on the page, under which the tables are
     needs: str = CUDA
     experiment: str = ""  # its configuration
     kinds: tuple = ()  # of tables.py, of an experiment
@@ -30,32 +32,38 @@ class Stage:
     parts: Callable = field(default=None)  # of a bench: Place -> [(file, command)]
     tables: Callable = field(default=None)  # of a bench: {file: what it wrote} -> {name: table of data.py}
 
+    @property
+    def link(self):
+        """To its section, from another page of docs."""
+        anchor = re.sub(r"[^\w -]", "", self.section.lower()).replace(" ", "-")
+        return f"[{self.page.removesuffix('.md')}: {self.section}]({self.page}#{anchor})"
+
 
 SHOWN = ("overview", "convergence_time_relmse", "convergence_spp", "stage_times", "comparison_glass")
 CAUSTIC = ("water-caustic",)
 PEERS = ("agreement", "samples", "errors", "ratios")
 STAGES = (
-    Stage("results", "results.md", 260, experiment="experiments/results.toml", kinds=("table", "further", "remarks"),
+    Stage("results", "results.md", 260, "Equal time on a device", experiment="experiments/results.toml", kinds=("table", "further", "remarks"),
           figures=SHOWN, pictures=("glass",)),
-    Stage("results_switches", "results.md", 150, experiment="experiments/results_switches.toml",
+    Stage("results_switches", "results.md", 150, "One setting at a time", experiment="experiments/results_switches.toml",
           kinds=("table", "further", "remarks"), figures=("ablation",)),
-    Stage("rays", "performance.md", 140, parts=benches.rays, tables=benches.rays_tables),
-    Stage("stages", "performance.md", 160, parts=benches.stages, tables=benches.stages_tables),
-    Stage("peers_device", "peers.md", 270, experiment="experiments/peers_device.toml", kinds=PEERS, spread=CAUSTIC,
+    Stage("rays", "performance.md", 140, "Rays alone", parts=benches.rays, tables=benches.rays_tables),
+    Stage("stages", "performance.md", 160, "Time of renders over the time of their rays", parts=benches.stages, tables=benches.stages_tables),
+    Stage("peers_device", "peers.md", 270, "On a device", experiment="experiments/peers_device.toml", kinds=PEERS, spread=CAUSTIC,
           figures=("convergence_time_relmse",)),
-    Stage("auto", "performance.md", 240, experiment="experiments/auto.toml", kinds=("errors",), spread=CAUSTIC),
-    Stage("claims", "claims.md", 1000),
-    Stage("switches_path", "performance.md", 160, experiment="experiments/switches_path.toml", kinds=("switches",)),
-    Stage("switches_bdpt", "performance.md", 250, experiment="experiments/switches_bdpt.toml", kinds=("switches",)),
-    Stage("frames", "performance.md", 60, parts=benches.frames, tables=benches.frames_tables),
-    Stage("waves", "performance.md", 90, parts=benches.waves, tables=benches.waves_tables),
-    Stage("builders", "performance.md", 120, parts=benches.builders, tables=benches.builders_tables),
-    Stage("optix", "performance.md", 140, OPTIX, parts=benches.optix, tables=benches.optix_tables),
-    Stage("devices", "scaling.md", 150, DEVICES, parts=benches.devices, tables=benches.devices_tables),
-    Stage("textures", "scaling.md", 100, parts=benches.textures, tables=benches.textures_tables),
-    Stage("model", "scaling.md", 30, NOTHING, parts=benches.model, tables=benches.model_tables),
-    Stage("cpu", "performance.md", 240, CPU, parts=benches.cpu, tables=benches.cpu_tables),
-    Stage("peers", "peers.md", 1800, CPU, experiment="experiments/peers.toml", kinds=PEERS, spread=CAUSTIC),
+    Stage("auto", "performance.md", 240, "Equal time", experiment="experiments/auto.toml", kinds=("errors",), spread=CAUSTIC),
+    Stage("claims", "claims.md", 1000, "Published claims"),
+    Stage("switches_path", "performance.md", 160, "One setting at a time", experiment="experiments/switches_path.toml", kinds=("switches",)),
+    Stage("switches_bdpt", "performance.md", 250, "One setting at a time", experiment="experiments/switches_bdpt.toml", kinds=("switches",)),
+    Stage("frames", "performance.md", 60, "Time and memory of one sample", parts=benches.frames, tables=benches.frames_tables),
+    Stage("waves", "performance.md", 90, "Waves and memory", parts=benches.waves, tables=benches.waves_tables),
+    Stage("builders", "performance.md", 120, "Fast build on the device", parts=benches.builders, tables=benches.builders_tables),
+    Stage("optix", "performance.md", 140, "OptiX", OPTIX, parts=benches.optix, tables=benches.optix_tables),
+    Stage("devices", "scaling.md", 150, "Measured", DEVICES, parts=benches.devices, tables=benches.devices_tables),
+    Stage("textures", "scaling.md", 100, "Scenes that do not fit", parts=benches.textures, tables=benches.textures_tables),
+    Stage("model", "scaling.md", 30, "Model", NOTHING, parts=benches.model, tables=benches.model_tables),
+    Stage("cpu", "performance.md", 240, "CPU", CPU, parts=benches.cpu, tables=benches.cpu_tables),
+    Stage("peers", "peers.md", 1800, "On a CPU", CPU, experiment="experiments/peers.toml", kinds=PEERS, spread=CAUSTIC),
 )
 BY_NAME = {stage.name: stage for stage in STAGES}
 

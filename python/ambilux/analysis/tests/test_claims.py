@@ -174,15 +174,22 @@ b = { arguments = ["--backend", "x"], kernel = "slow" }
 def test_the_page_says_what_is_evidence(tmp_path):
     more = '[[compare]]\nscene = "away"\nrun = "a"\nover = "b"\n'
     text = page_of(outcome_of(tmp_path, more=more), tmp_path / "images" / "claims", tmp_path)
-    for part in ("| [A over b](#a-over-b) | Somebody 2020 | ranking at equal time | **reproduced** |", "doi:10.1000/1",
-                 "Claim (table 1): *A is better.*", "Verdict: **reproduced** (", "not there: away.", "- Seeds: 1–3",
+    for part in ("| [A over b](#a-over-b) | Somebody 2020 | ranking at equal time | **reproduced** |  |", "doi:10.1000/1",
+                 "Claim (table 1): *A is better.*", "Verdict: **reproduced** (", "not found, left out: away.", "- Seeds: 1–3",
                  "![A over b: box](images/claims/c.png)", "- Revision: ambilux 0.1.0, git 0123456", "- The scene.",
                  "- Command: `ambilux experiment c.toml`"):
         assert part in text, part
     assert (tmp_path / "images" / "claims" / "c.png").stat().st_size > 1000
     small = page_of(outcome_of(tmp_path, small=True), tmp_path / "none", tmp_path)
-    assert "not run on a device; a small run says: reproduced" in small
+    assert "not run on a device; a small run says: reproduced" in small and "| not run on a device | reproduced |" in small
     assert "Verdict: **" not in small and not (tmp_path / "none").exists()
+
+
+def test_scenes_that_are_newer_than_the_data_are_named(tmp_path):
+    o = outcome_of(tmp_path)
+    stored = page.stored(o, tmp_path)
+    (later,) = registry.load(write_claim(tmp_path / "claims", more='[[compare]]\nscene = "away"\nrun = "a"\nover = "b"\n'))
+    assert page.newer_scenes(later, stored) == ["away"] and page.newer_scenes(o.claim, stored) == []
 
 
 def test_the_projects_page_names_every_claim():

@@ -55,6 +55,7 @@ def test_one_revision_and_one_kind_of_card_unless_the_pages_say_otherwise():
 def test_every_stage_is_on_its_page_and_its_files_are_there(stage):
     page = (DOCS / stage.page).read_text(encoding="utf-8")
     shown = {name for of, name, _ in data.BLOCK.findall(page) if of == stage.name}
+    assert f"# {stage.section}\n" in page
     if stage.experiment:
         assert shown >= set(stage.kinds), stage.name
         text = (ROOT / stage.experiment).read_text(encoding="utf-8")
@@ -108,6 +109,13 @@ def test_a_changed_figure_is_found():
     assert pages.texts(ROOT, DOCS, stored)[page] != (DOCS / page).read_text(encoding="utf-8")
 
 
+def test_one_sample_has_a_row_for_each_method():
+    found = {"frames_per_second": 226.2, "percentile_95_seconds": 0.00481, "memory_bytes_peak": 498 << 20}
+    results = [{"kind": "frames", "scene": "box", "key": method, "json": found} for method in ("path", "streaming")]
+    lines = data.block_lines(benches.frames_tables(results)["frames"])
+    assert lines[2:] == ["| box | path | 226 | 4.8 | 498 |", "|  | streaming | 226 | 4.8 | 498 |"]
+
+
 def test_age_counts_commits_of_device_code(tmp_path):
     def git(*words):
         subprocess.run(["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b", *words], check=True, capture_output=True)
@@ -120,7 +128,7 @@ def test_age_counts_commits_of_device_code(tmp_path):
         (tmp_path / "stages" / "a").write_text(str(i))
         git("add", "-A")
         git("commit", "-q", "-m", str(i))
-    assert data.age(first, tmp_path) == "older than 50 commits of device code"
+    assert data.age(first, tmp_path) == "more than 50 commits of device code behind"
     assert data.age("0" * 12, tmp_path) == "of a revision that this repository does not have"
     assert data.age("unknown", tmp_path) == "of a revision that was not recorded"
 
@@ -135,7 +143,7 @@ def made(tmp_path, noise, **changes):
     return replace(results, rows=rows, kept={})
 
 
-STAGE = stages.Stage("s", "results.md", 1, kinds=("table", "further", "errors", "ratios", "samples", "switches"))
+STAGE = stages.Stage("s", "results.md", 1, "Results", kinds=("table", "further", "errors", "ratios", "samples", "switches"))
 
 
 def test_errors_are_shown_where_the_reference_is_ten_times_better(tmp_path, monkeypatch):
@@ -160,7 +168,7 @@ def test_without_a_reference_the_spread_over_seeds_stands_for_errors(tmp_path):
     spread = [{"scene": "box", "run": "a", "seeds": 3, "relmse": 0.25, "rmse": 0.5}]
     blocks = collect.blocks(results, stage, spread)
     assert [row[1] for row in blocks["errors"]["rows"]] == ["(0.250)", None]
-    assert "no method makes a reference" in blocks["references"]["list"][0]
+    assert "no method gives a converged reference" in blocks["references"]["list"][0]
     assert all(c is None for row in blocks["ratios"]["rows"] for c in row[1:])
     assert all(math.isfinite(x.relmse.value) for x in summary.lines(results))
 
@@ -188,7 +196,7 @@ def place(tmp_path):
 
 def bench_stage(*names):
     parts = [benches.part("k", "box", name, ["ambilux", name, "OUT/x"]) for name in names]
-    return stages.Stage("rays", "p.md", 1, parts=lambda place: parts, tables=lambda results: {"k": benches.by_scene(results, "k", names, lambda of: [len(of(n) or []) for n in names])})
+    return stages.Stage("rays", "p.md", 1, "Rays", parts=lambda place: parts, tables=lambda results: {"k": benches.by_scene(results, "k", names, lambda of: [len(of(n) or []) for n in names])})
 
 
 def test_a_stage_goes_on_where_it_stopped_and_says_what_failed(tmp_path, place):

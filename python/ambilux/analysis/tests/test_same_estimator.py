@@ -36,7 +36,7 @@ def test_equal_errors_at_equal_seeds_are_one_estimator(tmp_path):
     assert none.low < 1 < none.high and none.high - none.low < 0.01
     assert lines["other"].ratio_time is None
     said = list(remarks.same_remarks(list(lines.values())))
-    assert len(said) == 2 and "a sample takes 1.3 times as long [1.3, 1.3]" in said[0] and "no effect on time per sample found: a sample takes 1 times as long" in said[1]
+    assert len(said) == 2 and "a sample takes 1.3 times as long [1.3, 1.3]" in said[0] and "no effect on the time per sample found (ratio 1 [" in said[1]
     assert "0.769 [0.769, 0.769] =" in tables.to_html(data, list(lines.values()))
 
 
@@ -61,4 +61,4 @@ def test_a_switch_that_sets_what_is_there_anyway_shows_the_machine(tmp_path):
         path = data.folder / "stats" / "box" / f"base_{seed}.json"
         path.write_text(json.dumps(json.loads(path.read_text()) | {"ordering": "none", "tail": False}))
     said = list(remarks.same_remarks(summary.lines(data), data))
-    assert [text.endswith("the difference shows how far times can be trusted") for text in said] == [False, True]  # ordering=morton, tail=false
+    assert [text.endswith("the difference shows the accuracy of the times") for text in said] == [False, True]  # ordering=morton, tail=false
