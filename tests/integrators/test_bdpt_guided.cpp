@@ -1,7 +1,8 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
-// bdpt with guided eye subpaths: means are those of closed forms and of bdpt, whatever was learned and whatever
-// strategies are off; what is learned depends on no thread; a stopped render goes on as it would have.
+// bdpt whose subpaths are guided, of the eye, of light, or both: means are those of closed forms and of bdpt, whatever
+// was learned and whatever strategies are off; what is learned depends on no thread; a stopped render goes on as it
+// would have.
 #include <cmath>
 
 #include "integrators/offers.h"
@@ -22,13 +23,19 @@ Estimate lvc(const Scene& scene, uint32_t spp) {
     return render_batches(scene, method_settings(scene, {"all", MisHeuristic::balance, "lvc"}, 1001), spp);
 }
 
+constexpr const char* kSides[] = {"eye", "light", "both"};
+
 }  // namespace
 
 TEST_CASE("A plane under a sphere is as bright as its closed form says") {
     const Scene scene = plane_under(kSphereLight);
     const Image expected = plane_image(kLight, sphere_irradiance);
-    for (const char* strategies : {"all", "hits", "hits+light"})
-        check_image(scene, guided_bdpt(scene, 3, {{"strategies", strategies}, {"guide_samples", "2"}}), expected);
+    for (const char* sides : kSides)
+        for (const char* strategies : {"all", "hits", "hits+light"}) {
+            INFO(sides << " " << strategies);
+            const SettingTexts own = {{"guide_sides", sides}, {"strategies", strategies}, {"guide_samples", "2"}};
+            check_image(scene, guided_bdpt(scene, 3, own), expected);
+        }
 }
 
 TEST_CASE("A diffuse room, glass, and all materials have the expectation of bdpt") {
@@ -38,7 +45,10 @@ TEST_CASE("A diffuse room, glass, and all materials have the expectation of bdpt
         scene.integrator.hide_emitters = true;
         const Estimate truth = lvc(scene, 1024);
         for (const SettingTexts& own :
-             std::vector<SettingTexts>{{}, {{"guide_target", "moment"}, {"heuristic", "power"}}})
+             std::vector<SettingTexts>{{},
+                                       {{"guide_target", "moment"}, {"heuristic", "power"}},
+                                       {{"guide_sides", "light"}},
+                                       {{"guide_sides", "both"}, {"guide_target", "moment"}, {"rr_depth", "2"}}})
             check_agreement(scene, guided_bdpt(scene, 12, own), 1024, truth, 0.05);
     }
 }
@@ -46,25 +56,30 @@ TEST_CASE("A diffuse room, glass, and all materials have the expectation of bdpt
 TEST_CASE("So has a strongly guided room whose strategies are off one group after the other") {
     const Scene scene = project_scene("cornell", 24, 24);
     const Estimate truth = lvc(scene, 1024);
-    for (const char* strategies : {"hits+next_event+connections", "hits+light+connections",
-                                   "next_event+light+connections", "hits+next_event+light"}) {
-        INFO(strategies);
-        const SettingTexts own = {{"strategies", strategies},
-                                  {"guide_bsdf", "0.2"},
-                                  {"guide_learn_bsdf", "false"},
-                                  {"guide_roulette", "false"}};
-        check_agreement(scene, guided_bdpt(scene, 13, own), 4096, truth, 0.05);
-    }
+    for (const char* sides : {"eye", "both"})
+        for (const char* strategies : {"hits+next_event+connections", "hits+light+connections",
+                                       "next_event+light+connections", "hits+next_event+light"}) {
+            INFO(sides << " " << strategies);
+            const SettingTexts own = {{"guide_sides", sides},
+                                      {"strategies", strategies},
+                                      {"guide_bsdf", "0.2"},
+                                      {"guide_learn_bsdf", "false"},
+                                      {"guide_roulette", "false"}};
+            check_agreement(scene, guided_bdpt(scene, 13, own), 4096, truth, 0.05);
+        }
 }
 
 TEST_CASE("What is learned depends on no thread, memory is predicted, and a stopped render goes on as it would have") {
     const Scene scene = project_scene("materials", 40, 24);
-    const RenderSettings s = guided_bdpt(scene, 5, {{"deterministic", "true"}});
-    const RenderResult one = render_on(1, scene, s, 12);
-    for (const int threads : {2, 7}) check_same_bits(render_on(threads, scene, s, 12), one);
-    CHECK(one.stats.memory_bytes == one.stats.memory_bytes_predicted);
-    CHECK(one.stats.invalid.total() == 0);
-    check_resumes_from_state(scene, s, one);
+    for (const char* sides : kSides) {
+        INFO(sides);
+        const RenderSettings s = guided_bdpt(scene, 5, {{"guide_sides", sides}, {"deterministic", "true"}});
+        const RenderResult one = render_on(1, scene, s, 12);
+        for (const int threads : {2, 7}) check_same_bits(render_on(threads, scene, s, 12), one);
+        CHECK(one.stats.memory_bytes == one.stats.memory_bytes_predicted);
+        CHECK(one.stats.invalid.total() == 0);
+        check_resumes_from_state(scene, s, one);
+    }
 }
 
 TEST_CASE("Stages of their own add in another order, as those of lvc do, and change nothing else") {
@@ -91,7 +106,7 @@ TEST_CASE("Stages of their own add in another order, as those of lvc do, and cha
 TEST_CASE("Paths of few segments") {
     for (const int depth : {0, 1, 2, 3}) {
         const Scene scene = project_scene("cornell", 16, 16);
-        RenderSettings s = guided_bdpt(scene, 5);
+        RenderSettings s = guided_bdpt(scene, 5, {{"guide_sides", "both"}});
         s.max_depth = depth;
         CHECK(render_scene(scene, s, 8).stats.invalid.total() == 0);
     }

@@ -138,15 +138,15 @@ TEST_CASE("Rays that roulette ended count in the mean of what rays bring, though
     wave.samples = 1;
     std::vector<Lane> samples(kTilePixels), places(2 * kTilePixels * GuideTraining::kDepths);
     std::vector<uint32_t> made(kTilePixels);
+    const GuideTraining training = {0, 1};
     const GuideRecords records = {{places.data(), kTilePixels * GuideTraining::kDepths}, made.data()};
     for (uint32_t slot = 0; slot < kTilePixels; slot += 4) {
         made[slot] = 1;
-        records.of_vertices.store(trees.policy.training.place(slot), {0, 0, kInv4Pi, 0.0f, 0.5f, 0.5f, kSurvival, 0});
+        records.of_vertices.store(training.place(slot), {0, 0, kInv4Pi, 0.0f, 0.5f, 0.5f, kSurvival, 0});
         const float brought = 0.5f * kBrings / kSurvival;
         set_start(samples[slot], Rgb{brought, brought, brought});
     }
-    const LearnRecords learn = {wave,    trees.policy.training, trees.policy.guided, trees.state,
-                                records, samples.data(),        &trees.record};
+    const LearnRecords learn = {{wave, training, trees.settings, trees.state, &trees.record}, records, samples.data()};
     for (uint32_t group = 0; group < kTilePixels; ++group) learn(group);
     trees.learn([&](uint32_t leaf) { trees.put(leaf, {0, 0, 1}, 5); });
     CHECK(trees.state.tree.leaves[0].reflected == Approx(kBrings));
