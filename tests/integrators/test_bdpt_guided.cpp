@@ -8,6 +8,7 @@
 #include "integrators/offers.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/guided_settings.h"
+#include "tests/support/guided_trees.h"
 
 using namespace ambilux;
 
@@ -25,7 +26,87 @@ Estimate lvc(const Scene& scene, uint32_t spp) {
 
 constexpr const char* kSides[] = {"eye", "light", "both"};
 
+/// Eye rays that end in one place, learned one by one.
+struct Arrivals {
+    using Mis = GuidedMis<BidirectionalMis>;
+    using Items = SubpathItems<Mis>;
+
+    Scene scene = project_scene("cornell", 8, 8);
+    test::Trees trees;
+    GuideProgress eye{};
+    WaveState at{};
+    std::vector<Lane> lanes{LaneArray<HitItem<Items::Ray>>::kLanes};
+    Wave wave{};
+
+    explicit Arrivals(const GuidedSettings& settings) : trees(settings) {
+        at.samples = 1;
+        wave.state = &at;
+        wave.width = wave.height = kTileSide;
+        wave.tiles_x = wave.tiles = Divisor(1);
+        wave.samples = 1;
+        trees.state.progress->rounds = kGuideRounds;
+    }
+    void learn(uint32_t depth, Vec3f direction, float throughput, float over_pixel) {
+        Subpath<Mis> path{};
+        path.direction = direction;
+        path.throughput = {throughput, throughput, throughput};
+        path.sums.over_pixel = over_pixel;
+        path.depth = at.depth = depth;
+        const Queue<HitItem<Items::Ray>> hits = {{lanes.data(), 1}};
+        // One that all decide to learn from.
+        const uint32_t slot = GuideTraining{6, 1}.slot_of(wave, 0);
+        hits.store(0, {Items::pack(path, Side::eye, slot, kInfinity), 0.25f, 0.25f, 0, 0});
+        const LearnImportance<kAllFeatures, Mis> stage = {
+            {wave, {0, 1}, trees.settings, trees.state, &trees.record}, scene.view(), hits, &eye};
+        stage(0);
+    }
+};
+
 }  // namespace
+
+TEST_CASE("Importance is learned in the direction that it came from, by what its pixel is expected to be") {
+    GuidedSettings settings;
+    settings.filter = false;
+    Arrivals arrivals(settings);
+    const GuidedState& state = arrivals.trees.state;
+    const Vec3f d = {0.6f, 0.0f, -0.8f};
+    arrivals.eye.unit[uint32_t(GuideSum::radiance)] = 8 / LearnRecords::kMean;
+    arrivals.learn(1, d, 2, 0);  // seen by the camera
+    arrivals.learn(2 + GuideTraining::kDepths, d, 2, 0);
+    CHECK(std::all_of(state.found, state.found + 4, [](int64_t n) { return n == 0; }));
+    arrivals.learn(2, d, 2, 0);
+    arrivals.learn(3, d, 2, 0.25f);  // a pixel half as bright as the mean
+    const uint32_t cell = state.tree.quads.cell(0, square_of_direction(-d)).quadrant;
+    for (uint32_t quadrant = 0; quadrant < 4; ++quadrant) {
+        CHECK(state.found[quadrant] == (quadrant == cell ? 2 : 0));
+        CHECK(state.sums[quadrant] == (quadrant == cell ? 2 + 4 : 0));
+    }
+}
+
+TEST_CASE("Light subpaths follow the tree where importance does, and the BSDF where it has learned noise") {
+    for (const bool noise : {false, true}) {
+        GuidedSettings settings;
+        settings.split = 1u << 20;
+        Arrivals arrivals(settings);
+        for (int k = 0; k < 2; ++k) {
+            arrivals.trees.learn([&](uint32_t leaf) { arrivals.trees.put_light(leaf, 1000); });
+            arrivals.trees.state.progress->rounds = kGuideRounds - 1;
+        }
+        arrivals.trees.state.progress->rounds = kGuideRounds;
+        const GuideTree& tree = arrivals.trees.state.tree;
+        CHECK(tree.leaves[0].bsdf_share == settings.bsdf_share);
+        const Vec3f n = surface_at<kAllFeatures>(arrivals.scene.view(), 0, 0.25f, 0.25f).ng;
+        for (uint32_t k = 0; k < 1000; ++k) {
+            const Vec4f u = random_floats({5, k, 0, Stream::test}, 0);
+            const Vec3f from = noise ? frame_from_normal(n).to_world(square_to_cosine_hemisphere({u.x, u.y}))
+                                     : square_to_sphere(tree.quads.descend(0, {u.x, u.y}, true).at);
+            arrivals.learn(2, -from, 1000, 0);
+        }
+        arrivals.trees.state.progress->rounds = kGuideRounds - 1;
+        arrivals.trees.learn([](uint32_t) {});
+        CHECK(tree.leaves[0].bsdf_share == GuideShares::of(noise ? GuideShares::kCount - 1 : 0));
+    }
+}
 
 TEST_CASE("A plane under a sphere is as bright as its closed form says") {
     const Scene scene = plane_under(kSphereLight);

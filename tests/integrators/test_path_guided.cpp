@@ -217,14 +217,20 @@ TEST_CASE("Units of light and of length change nothing that is learned") {
             "<emitter type='area'><rgb name='radiance' value='{7}'/></emitter></shape></scene>",
             0.001 * size, 0.9 * size, size, 0.5 * size, 0.5 * size, 0.3 * size, 0.7 * size, radiance));
     };
-    const auto mean = [&](double size, double radiance) {
-        const Scene scene = room(size, radiance);
-        const RenderResult r = render_scene(scene, guided(scene, 7), 16);
-        CHECK(r.stats.invalid.total() == 0);
-        return mean_of(r.film) / radiance;
-    };
-    const double usual = mean(1, 1);
-    CHECK(usual > 0);
-    CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
-    for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+    for (const char* integrator : {"path", "bdpt"}) {
+        const auto mean = [&](double size, double radiance) {
+            const Scene scene = room(size, radiance);
+            RenderSettings s = guided(scene, 7);
+            s.integrator = integrator;
+            if (s.integrator == "bdpt") apply_setting(s, "guide_sides", "both");
+            const RenderResult r = render_scene(scene, s, 16);
+            CHECK(r.stats.invalid.total() == 0);
+            return mean_of(r.film) / radiance;
+        };
+        INFO(integrator);
+        const double usual = mean(1, 1);
+        CHECK(usual > 0);
+        CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
+        for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+    }
 }

@@ -229,10 +229,30 @@ struct LearnImportance : GuideAdds {
         const float of_mean = path.sums.over_pixel * kMean * eye->unit[uint32_t(GuideSum::radiance)],
                     value = recorded_luminance(path.throughput) * (of_mean > 0.0f ? of_mean : 1.0f);
         if (!(value < kInfinity)) return;
-        const uint32_t leaf = state.tree.leaf(surface_at<F>(scene, hit.prim, hit.u, hit.v).p);
+        const SurfacePoint point = surface_at<F>(scene, hit.prim, hit.u, hit.v);
+        const uint32_t leaf = state.tree.leaf(point.p);
         const Vec2f place = square_of_direction(-path.direction);
-        add_to_cell(hit.ray.path, GuideTraining::kDepths + depth - 2, leaf, place, state.tree.quads.cell(leaf, place),
-                    value);
+        const GuideQuads::Cell cell = state.tree.quads.cell(leaf, place);
+        if (training.trains(wave, hit.ray.path, training.shift + kLearnShare))
+            learn_share(leaf, fabsf(dot(point.ng, path.direction)), cell.density, value);
+        add_to_cell(hit.ray.path, GuideTraining::kDepths + depth - 2, leaf, place, cell, value);
+    }
+
+private:
+    static constexpr uint32_t kLearnShare = 2;  ///< one of 2^this slots that train
+
+    /// How unlikely the direction was by other shares of the BSDF (GuideShares): the mean is least for what is most
+    /// like the importance that arrives. What a light subpath would bring is not known here, nor from where; the BSDF
+    /// counts as a diffuse one.
+    AMBILUX_HD void learn_share(uint32_t leaf, float cosine, float density, float value) const {
+        constexpr float kMostBits = 2.0f * GuideQuads::kLevels, kLeast = 0x1p-16f;
+        if (!settings.learn_share || state.tree.leaves[leaf].bsdf_share == 1.0f) return;
+        const float units = min(in_units(GuideSum::target, value), GuideShares::kMost);
+        for (uint32_t k = 0; k < GuideShares::kCount; ++k) {
+            const float share = GuideShares::of(k), here = share * 4.0f * cosine + (1.0f - share) * density;
+            fetch_add_shared(state.shares + leaf * GuideShares::kCount + k,
+                             int64_t(units * (kMostBits - log2f(max(here, kLeast)))));
+        }
     }
 };
 

@@ -32,11 +32,10 @@ struct GuidedSettings {
 
     static GuidedSettings plan(const RenderSettings& settings);
     bool guides(Side side) const { return (uint32_t(sides) + 1) >> uint32_t(side) & 1u; }
-    /// What light subpaths bring is not known where they scatter: no share of the BSDF is learned there.
+    /// What light subpaths bring is not known where they scatter.
     GuidedSettings of_light() const {
         GuidedSettings s = *this;
         s.target = GuideTarget::radiance;
-        s.learn_share = false;
         return s;
     }
     /// Of the tree of a side.
