@@ -17,7 +17,7 @@ namespace {
 struct TraceArguments {
     SceneOptions scene;
     RenderOptions render;
-    std::string pixel, strategy, json, guide;
+    std::string pixel, strategy, json, guide, guide_side = "eye";
     std::optional<uint32_t> sample, light_subpath;
     bool compare = false;
 };
@@ -48,8 +48,8 @@ void compare(const Scene& scene, const RenderSettings& settings, const ReplayReq
 
 /// Pictures of what was learned where the eye subpath met something, one layer a vertex, and statistics of the trees.
 void show_guide(const Replay& replay, const Scene& scene, const ReplaySample& sample, const std::string& path,
-                nlohmann::json& json, std::string& text) {
-    const std::shared_ptr<const GuidedState> guide = guide_of(replay, sample.sample, "--");
+                const std::string& side, nlohmann::json& json, std::string& text) {
+    const std::shared_ptr<const GuidedState> guide = guide_of(replay, sample.sample, side, "--");
     json["guide"] = guide_json(guide_arrays(*guide, scene), *guide);
     text += guide_text(json["guide"]);
     std::vector<Layer> layers;
@@ -83,7 +83,7 @@ int trace(const TraceArguments& o) {
         nlohmann::json json = replay_json(seen..., format);
         std::string text = replay_text(seen..., format);
         if constexpr (sizeof...(seen) == 1)
-            if (!o.guide.empty()) show_guide(*replay, loaded.scene, seen..., o.guide, json, text);
+            if (!o.guide.empty()) show_guide(*replay, loaded.scene, seen..., o.guide, o.guide_side, json, text);
         if (o.compare) compare(loaded.scene, settings, request, accels, json, text);
         if (!o.json.empty()) write_json(o.json, json);
         if (o.json != "-") std::cout << text << std::flush;
@@ -121,6 +121,8 @@ void add_trace(CLI::App& app, Run& run) {
         "--guide", o->guide,
         "Variants guided: write pictures (EXR) of the densities that were learned at the vertices of the "
         "eye subpath, and print what the trees are like");
+    command.add_option("--guide-side", o->guide_side,
+                       "Whose: eye, what was learned about light, or light, what was learned about importance");
     command.add_option("--json", o->json, "Write the replay to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return trace(*o); }; });
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "integrators/parse_value.h"
 #include "render/replay/kept_guide.h"
 
 namespace ambilux {
@@ -58,10 +59,15 @@ uint32_t levels(const GuideArrays& arrays, uint32_t node) {
 
 }  // namespace
 
-std::shared_ptr<const GuidedState> guide_of(const Replay& replay, uint32_t sample, const std::string& prefix) {
+std::shared_ptr<const GuidedState> guide_of(const Replay& replay, uint32_t sample, const std::string& side,
+                                            const std::string& prefix) {
     const std::shared_ptr<const KeptGuide> kept = replay.guide(sample);
     if (!kept) throw Error(ExitCode::usage, prefix + "guide: variants guided alone learn where light comes from");
-    return {kept, &kept->state};
+    const Side of = Side(parse_choice("side", side, {"eye", "light"}));
+    if (!kept->policy.guided.guides(of))
+        throw Error(ExitCode::usage,
+                    fmt::format("{}guide: this render guides no {} subpaths (guide_sides)", prefix, side));
+    return {kept, of == Side::eye ? &kept->state.eye : &kept->state.light};
 }
 
 GuideArrays guide_arrays(const GuidedState& guide, const Scene& scene) {

@@ -12,15 +12,16 @@
 
 namespace ambilux {
 
-/// What the paths of a sample follow, for as long as the pointer lives. Throws Error(usage), with `prefix` before it,
-/// where a method guides none.
-std::shared_ptr<const GuidedState> guide_of(const Replay& replay, uint32_t sample, const std::string& prefix);
+/// What the subpaths of a side, "eye" or "light", follow in a sample, for as long as the pointer lives. Throws
+/// Error(usage), with `prefix` before it, where a method guides none.
+std::shared_ptr<const GuidedState> guide_of(const Replay& replay, uint32_t sample, const std::string& side,
+                                            const std::string& prefix);
 
 /// Leaves of the tree over space, one an entry, and nodes of their quadtrees over directions, leaf after leaf.
 struct GuideArrays {
     std::vector<std::array<double, 3>> low, high;   ///< boxes, in coordinates of the scene's file
     std::vector<float> bsdf_share;                  ///< of directions that the BSDF samples; 1: nothing was learned
-    std::vector<float> reflected;                   ///< mean radiance that scattered rays bring; 0: not known
+    std::vector<float> reflected;                   ///< mean radiance that eye rays bring; 0: not known
     std::vector<uint32_t> depth, first, count;      ///< halvings of the cube; nodes of the quadtree
     std::vector<std::array<float, 4>> probability;  ///< of the quadrants x + 2y of a node
     std::vector<std::array<int32_t, 4>> child;      ///< entry of the node that a quadrant is; -1: a cell

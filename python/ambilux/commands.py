@@ -54,13 +54,13 @@ def light_vertices(scene: Scene | str | os.PathLike[str], sample: int = 0, integ
 
 def guide(scene: Scene | str | os.PathLike[str], sample: int, integrator: str = "path", variant: str = "guided", *, point: Sequence[float] | None = None,
           seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
-          settings: Mapping[str, Any] | None = None) -> Record:
+          settings: Mapping[str, Any] | None = None, side: str = "eye") -> Record:
     """What path guiding has learned when `sample` is rendered, as arrays: renders the iterations before it. Settings as in the render, `guide_samples` among them.
 
     Leaves of the tree over space: boxes `low` and `high` (n, 3) float64 in coordinates of the scene's file, `bsdf_share`, `reflected` (mean radiance that scattered
     rays bring), `depth` (n,), and `first` and `count` (n,): nodes of the quadtree over directions, none before light was found. Nodes: `probability` (m, 4) float32
     of the quadrants x + 2y of the unit square ((1 - cos θ)/2, φ/2π), and `child` (m, 4) int32: the node that a quadrant is, -1 for a cell. `statistics` sums up.
-    With `point`, `density` (64, 128) is a picture of what was learned there, times 4π; rows go by (1 - cos θ)/2 from +z, columns by φ.
+    `side` "light" has the tree of light subpaths (`guide_sides`). With `point`, `density` (64, 128) is a picture of what was learned there, times 4π; rows go by (1 - cos θ)/2 from +z, columns by φ.
 
     >>> tree = ambilux.guide(scene, 8, settings={"guide_samples": 4}, point=(0, 0, 0))
     >>> tree.low.shape == tree.high.shape == (len(tree.first), 3), abs(float(tree.density.mean()) - 1) < 0.05
@@ -68,7 +68,7 @@ def guide(scene: Scene | str | os.PathLike[str], sample: int, integrator: str = 
     """
     loaded = scene_of(scene, size)
     chosen = _core.Settings(loaded._core, assignments(settings, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend))
-    arrays = _core.guide(loaded._core, chosen, index("sample", sample), None if point is None else [float(c) for c in point])
+    arrays = _core.guide(loaded._core, chosen, index("sample", sample), None if point is None else [float(c) for c in point], side)
     return Record(**{**arrays, "statistics": record(arrays["statistics"])})
 
 

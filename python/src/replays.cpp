@@ -91,14 +91,14 @@ nb::dict vertices_of(const SharedScene& scene, RenderSettings settings, uint32_t
 }
 
 nb::dict trees_of(const SharedScene& scene, RenderSettings settings, uint32_t sample,
-                  std::optional<std::array<double, 3>> point) {
+                  std::optional<std::array<double, 3>> point, const std::string& side) {
     if (settings.backend == Backend::automatic) settings.backend = Backend::cpu;
     GuideArrays a;
     Layer picture;
     nlohmann::json statistics;
     run_unlocked([&](const volatile bool*) {
         SharedAccels accels(scene->scene, scene->structures);
-        const auto guide = guide_of(*make_replay(scene->scene, settings, accels), sample, "");
+        const auto guide = guide_of(*make_replay(scene->scene, settings, accels), sample, side, "");
         a = guide_arrays(*guide, scene->scene);
         statistics = guide_json(a, *guide);
         if (!point) return;
@@ -134,7 +134,7 @@ void bind_replays(nb::module_& m) {
     m.def("trace", &trace, "scene"_a, "settings"_a, "pixel"_a.none(), "sample"_a, "light_subpath"_a.none(),
           "strategy"_a, "compare"_a, "One sample as JSON and as text.");
     m.def("light_vertices", &vertices_of, "scene"_a, "settings"_a, "sample"_a);
-    m.def("guide", &trees_of, "scene"_a, "settings"_a, "sample"_a, "point"_a.none());
+    m.def("guide", &trees_of, "scene"_a, "settings"_a, "sample"_a, "point"_a.none(), "side"_a);
 }
 
 }  // namespace ambilux

@@ -16,9 +16,8 @@ std::shared_ptr<const ReplayContext<Mis>> guided_context(const ReplayContext<Mis
         ReplayContext<Mis> ctx;
     };
     const auto whole = std::make_shared<Whole>(Whole{guide.at(sample), ctx});
-    const GuideTree& tree = whole->kept->state.tree;
-    whole->ctx.rules.directions = {tree, guide.roulette()};
-    whole->ctx.rules.mis.tree = tree;
+    whole->ctx.rules.mis.trees = followed<Mis::kBidirectional>(whole->kept->state, guide.settings());
+    whole->ctx.rules.directions = {whole->ctx.rules.mis.trees, guide.settings().roulette};
     return {whole, &whole->ctx};
 }
 /// What the camera ray of a sample knows of its pixel (ReplayJoins::start).
@@ -26,7 +25,7 @@ template <class Mis>
 auto guided_start(const ReplayContext<Mis>& ctx, const ReplayedGuide& guide, const ReplayRequest& request) {
     const uint32_t across = (ctx.view.sensor.crop_width + kTileSide - 1) / kTileSide,
                    tile = request.y / kTileSide * across + request.x / kTileSide;
-    const float over_pixel = guide.at(request.sample)->state.over_pixel[tile];
+    const float over_pixel = guide.at(request.sample)->state.eye.over_pixel[tile];
     return [over_pixel](Subpath<Mis>& path) { path.sums.over_pixel = over_pixel; };
 }
 

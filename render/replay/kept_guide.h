@@ -21,16 +21,16 @@ struct GuidePolicy {
 
 /// The state of a guided method, in memory of the host; what StateMemory asks of its owner.
 struct KeptGuide {
-    using State = GuidedState;
+    using State = GuidedStates;
 
     GuidePolicy policy;
     uint32_t appended = 0;
-    GuidedState state{};
+    GuidedStates state{};
     StateMemory<HostMemory, KeptGuide> memory{*this};
 
     explicit KeptGuide(const GuidePolicy& p) : policy(p) {}
-    GuidedState lay_out_state(Layout& layout) const {
-        return GuidedState::lay_out(layout, policy, {0, host_primitive_bytes()});
+    GuidedStates lay_out_state(Layout& layout) const {
+        return GuidedStates::lay_out(layout, policy, {0, host_primitive_bytes()});
     }
 };
 
@@ -40,7 +40,7 @@ public:
     ReplayedGuide(const Scene& scene, const RenderSettings& settings, const GuidePolicy& policy)
         : scene_(scene), settings_(settings), policy_(policy) {}
 
-    bool roulette() const { return policy_.guided.roulette; }
+    const GuidedSettings& settings() const { return policy_.guided; }
     uint32_t iteration_samples() const { return policy_.guided.iteration_samples; }
     /// As the iteration of this sample begins, trained.
     std::shared_ptr<const KeptGuide> at(uint32_t sample) const;

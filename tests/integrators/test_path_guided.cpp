@@ -138,15 +138,15 @@ TEST_CASE("Rays that roulette ended count in the mean of what rays bring, though
     wave.samples = 1;
     std::vector<Lane> samples(kTilePixels), places(2 * kTilePixels * GuideTraining::kDepths);
     std::vector<uint32_t> made(kTilePixels);
+    const GuideTraining training = {0, 1};
     const GuideRecords records = {{places.data(), kTilePixels * GuideTraining::kDepths}, made.data()};
     for (uint32_t slot = 0; slot < kTilePixels; slot += 4) {
         made[slot] = 1;
-        records.of_vertices.store(trees.policy.training.place(slot), {0, 0, kInv4Pi, 0.0f, 0.5f, 0.5f, kSurvival, 0});
+        records.of_vertices.store(training.place(slot), {0, 0, kInv4Pi, 0.0f, 0.5f, 0.5f, kSurvival, 0});
         const float brought = 0.5f * kBrings / kSurvival;
         set_start(samples[slot], Rgb{brought, brought, brought});
     }
-    const LearnRecords learn = {wave,    trees.policy.training, trees.policy.guided, trees.state,
-                                records, samples.data(),        &trees.record};
+    const LearnRecords learn = {{wave, training, trees.settings, trees.state, &trees.record}, records, samples.data()};
     for (uint32_t group = 0; group < kTilePixels; ++group) learn(group);
     trees.learn([&](uint32_t leaf) { trees.put(leaf, {0, 0, 1}, 5); });
     CHECK(trees.state.tree.leaves[0].reflected == Approx(kBrings));
@@ -217,14 +217,20 @@ TEST_CASE("Units of light and of length change nothing that is learned") {
             "<emitter type='area'><rgb name='radiance' value='{7}'/></emitter></shape></scene>",
             0.001 * size, 0.9 * size, size, 0.5 * size, 0.5 * size, 0.3 * size, 0.7 * size, radiance));
     };
-    const auto mean = [&](double size, double radiance) {
-        const Scene scene = room(size, radiance);
-        const RenderResult r = render_scene(scene, guided(scene, 7), 16);
-        CHECK(r.stats.invalid.total() == 0);
-        return mean_of(r.film) / radiance;
-    };
-    const double usual = mean(1, 1);
-    CHECK(usual > 0);
-    CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
-    for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+    for (const char* integrator : {"path", "bdpt"}) {
+        const auto mean = [&](double size, double radiance) {
+            const Scene scene = room(size, radiance);
+            RenderSettings s = guided(scene, 7);
+            s.integrator = integrator;
+            if (s.integrator == "bdpt") apply_setting(s, "guide_sides", "both");
+            const RenderResult r = render_scene(scene, s, 16);
+            CHECK(r.stats.invalid.total() == 0);
+            return mean_of(r.film) / radiance;
+        };
+        INFO(integrator);
+        const double usual = mean(1, 1);
+        CHECK(usual > 0);
+        CHECK(mean(1, 0x1p-33) == Approx(usual).epsilon(1e-3));  // about 1e-10
+        for (const double size : {1e-3, 1e3}) CHECK(mean(size, 1) == Approx(usual).epsilon(0.05));
+    }
 }

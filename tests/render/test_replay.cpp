@@ -120,7 +120,10 @@ const ReplayConfig kMerging[] = {
 const ReplayConfig kGuided[] = {
     {"path", "guided", {{"guide_samples", "2"}, {"guide_split", "16"}, {"guide_leaves", "64"}}},
     {"path", "guided", {{"guide_samples", "1"}, {"guide_target", "moment"}, {"estimator", "nee"}}},
-    {"bdpt", "guided", {{"guide_samples", "2"}, {"guide_split", "16"}, {"guide_leaves", "64"}}},
+    {"bdpt",
+     "guided",
+     {{"guide_samples", "2"}, {"guide_split", "16"}, {"guide_leaves", "64"}, {"guide_sides", "both"}}},
+    {"bdpt", "guided", {{"guide_samples", "2"}, {"guide_sides", "light"}, {"rr_depth", "1"}}},
     {"bdpt", "guided", {{"guide_samples", "1"}, {"heuristic", "power"}, {"rr_depth", "1"}, {"connections", "1"}}},
 };
 

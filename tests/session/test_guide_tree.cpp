@@ -15,8 +15,8 @@ TEST_CASE("Boxes of leaves fill the cube, quadtrees have what a path samples, an
     SharedAccels accels(scene);
     const std::shared_ptr<const KeptGuide> guide = make_replay(scene, settings, accels)->guide(8);
     REQUIRE(guide);
-    const GuideTree& tree = guide->state.tree;
-    const GuideArrays a = guide_arrays(guide->state, scene);
+    const GuideTree& tree = guide->state.eye.tree;
+    const GuideArrays a = guide_arrays(guide->state.eye, scene);
     REQUIRE(a.count.size() > 4);
     double volume = 0;
     for (size_t leaf = 0; leaf < a.count.size(); ++leaf) {
@@ -43,12 +43,12 @@ TEST_CASE("Boxes of leaves fill the cube, quadtrees have what a path samples, an
     }
     const double side = 1 / double(tree.inverse_side);
     CHECK(volume == Approx(side * side * side));
-    const nlohmann::json said = guide_json(a, guide->state);
+    const nlohmann::json said = guide_json(a, guide->state.eye);
     CHECK(said["leaves"] == a.count.size());
     CHECK(said["nodes"] == a.probability.size());
     CHECK(said["updates"] == kGuideRounds + 2);  // nothing is known of units in the first round
     CHECK(guide_text(said).starts_with("guide after"));
-    const Layer picture = guide_layer(guide->state, {0, 0, 0}, "here");
+    const Layer picture = guide_layer(guide->state.eye, {0, 0, 0}, "here");
     double mean = 0;
     for (const float v : picture.values) mean += double(v) / double(picture.values.size());
     CHECK(mean == Approx(1).epsilon(0.05));

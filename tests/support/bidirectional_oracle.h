@@ -37,9 +37,12 @@ struct OraclePath {
     Vec2f lens_u;
 };
 
-/// What eye subpaths sample by instead of the BSDF: the density of `left` at a vertex that they reached from `arrived`,
-/// where the BSDF has `bsdf`; of deltas the probability.
-using EyeDensity = std::function<double(const OraclePath::Vertex&, Vec3f arrived, Vec3f left, double bsdf)>;
+/// What subpaths of a side sample by instead of the BSDF: the density of `left` at a vertex that they reached from
+/// `arrived`, where the BSDF has `bsdf`; of deltas the probability.
+using SideDensity = std::function<double(const OraclePath::Vertex&, Vec3f arrived, Vec3f left, double bsdf)>;
+struct SideDensities {
+    SideDensity eye, light;
+};
 
 /// A local density, and how much rounding of its arguments may change it (relative).
 struct OracleDensity {
@@ -146,10 +149,10 @@ inline DeltaLobe delta_lobe(const SceneView& scene, const SurfacePoint& point, V
 /// draws directions towards the light; the change of variables is the ratio of solid angles, n_l² cos_l / (n_e² cos_e)
 /// by Snell's law (Veach 1997, section 5.2).
 inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::Vertex& x, Vec3f arrived, Vec3f left,
-                                     bool from_light, bool conditioning, const EyeDensity& eye = {}) {
-    if (eye)
+                                     bool from_light, bool conditioning, const SideDensity& side = {}) {
+    if (side)
         return at_directions(arrived, left, conditioning, [&](Vec3f a, Vec3f l) {
-            return eye(x, a, l, scattering_step(scene, x, a, l, from_light, false).value);
+            return side(x, a, l, scattering_step(scene, x, a, l, from_light, false).value);
         });
     return at_directions(arrived, left, conditioning, [&](Vec3f a, Vec3f l) -> double {
         if (!x.delta) return scatter_pdf<F>(make_scattering<F>(scene, x.point, a), l);
@@ -171,7 +174,7 @@ inline double emitter_opacity(const SceneView& scene, uint32_t prim) {
 /// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both subpaths
 /// take its lens point alike), and x_(k-1) by the camera at density 1 per pixel. `conditioning`: errors too.
 inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, bool conditioning,
-                                const EyeDensity& eye = {}) {
+                                const SideDensities& sides = {}) {
     using namespace oracle;
     const uint32_t k = path.k;
     const Emitter& e = scene.emitters[path.emitter];
@@ -207,7 +210,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
             q = infinite ? OracleDensity{emission_position, 0} : emission;
         else
             q = scattering_step(scene, path.vertices[i - 1], -path.to_eye[i - 2], path.to_eye[i - 1], true,
-                                conditioning);
+                                conditioning, sides.light);
         times_cosine(q, normal(i), path.to_eye[i - 1]);
         if (!(infinite && i == 1)) over_distance(q, distance2(position(i - 1), position(i)), error(i - 1), error(i));
     }
@@ -271,7 +274,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
             q.error = camera_delta_direction(sensor) ? 0 : 3 * double(kDirectionError) / cos_camera;
         } else {
             q = scattering_step(scene, path.vertices[i + 1], path.to_eye[i + 1], -path.to_eye[i], false, conditioning,
-                                eye);
+                                sides.eye);
         }
         if (i == 0 && infinite) continue;
         if (i == 0) q.value *= emitter_opacity(scene, path.light.prim);

@@ -268,8 +268,8 @@ inline float reverse_pdf(const Scattering& s, Vec3f wo_world) {
 
 /// What a model of weights knows of merges.
 inline OracleMerges merges_of(const BidirectionalMis&) { return {}; }
-/// How eye subpaths sample directions.
-inline EyeDensity eye_density_of(const SceneView&, const BidirectionalMis&) { return {}; }
+/// How subpaths sample directions.
+inline SideDensities densities_of(const SceneView&, const BidirectionalMis&) { return {}; }
 /// Expected samples of each strategy of connections of a path.
 inline double connections_of(const BidirectionalMis& mis, const SceneView&, const OraclePath&) {
     return double(mis.connections);
@@ -511,7 +511,7 @@ private:
     }
 
     OracleSteps steps_of(const OraclePath& path, bool conditioning) const {
-        return oracle_steps(scene_, path, conditioning, eye_density_of(scene_, mis_));
+        return oracle_steps(scene_, path, conditioning, densities_of(scene_, mis_));
     }
     /// Of the direction `wo` and of the way back.
     BsdfValue densities(const Vertex<Mis>& v, Vec3f wo, Side side) const {

@@ -9,23 +9,22 @@ namespace ambilux::test {
 
 /// Trees in memory of their own, and the steps that make them.
 struct Trees {
-    struct Policy {
-        GuidedSettings guided;
-        GuideTraining training;
-    } policy;
+    GuidedSettings settings;
     HostMemory memory;
     GuidedState state;
     StageRecord record{};
 
-    explicit Trees(const GuidedSettings& settings) : policy{settings, {0, 4}} {
-        if (policy.guided.most_leaves == 0) policy.guided.most_leaves = 8192;
+    explicit Trees(const GuidedSettings& of) : settings(of) {
+        if (settings.most_leaves == 0) settings.most_leaves = 8192;
         Layout dry;
-        const StateSize size = {0, host_primitive_bytes()};
-        GuidedState::lay_out(dry, policy, size);
+        const auto lay_out = [this](Layout& layout) {
+            return GuidedState::lay_out(layout, settings.most_leaves, 4, {0, host_primitive_bytes()});
+        };
+        lay_out(dry);
         memory = HostMemory(dry.bytes());
         Layout placed(dry, memory.data());
-        state = GuidedState::lay_out(placed, policy, size);
-        state.init(policy, [](auto* to, const auto& from) { std::copy(from.begin(), from.end(), to); });
+        state = lay_out(placed);
+        state.init([](auto* to, const auto& from) { std::copy(from.begin(), from.end(), to); });
         state.tree.inverse_side = 1.0f;
         state.progress->unit[0] = 1.0f;
     }
@@ -33,7 +32,7 @@ struct Trees {
     template <class Add>
     void learn(Add add) {
         for (uint32_t leaf = 0; leaf < state.progress->leaves; ++leaf) add(leaf);
-        GuideStep step = {state, policy.guided, &record, state.progress->rounds};
+        GuideStep step = {state, settings, &record, state.progress->rounds};
         CpuWholeExecutor exec;
         GuideUpdate::of(step).run(exec);
     }

@@ -1,5 +1,5 @@
-// bdpt, variant guided: eye subpaths of lvc sample directions from what was learned (integrators/shared/guide). Light
-// subpaths follow the BSDF (docs/theory.md, "Guided bdpt").
+// bdpt, variant guided: subpaths of lvc sample directions from what was learned (integrators/shared/guide;
+// docs/theory.md, "Guided bdpt").
 #pragma once
 
 #include "integrators/bdpt/lvc/integrator.h"

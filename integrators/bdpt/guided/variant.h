@@ -6,10 +6,10 @@
 
 namespace ambilux {
 
-struct BdptGuidedVariant : GuidedVariant {
+struct BdptGuidedVariant : GuidedSidesVariant {
     static constexpr const char* kHelp =
-        "lvc whose eye subpaths sample directions from what it has learned about where light comes from (path guiding, "
-        "Müller et al. 2017)";
+        "lvc whose subpaths sample directions from what it has learned about where light and importance come from "
+        "(path guiding, Müller et al. 2017)";
     static constexpr VariantTraits kTraits = {.strategies = true,
                                               .light_subpaths = true,
                                               .draws = true,
@@ -20,7 +20,9 @@ struct BdptGuidedVariant : GuidedVariant {
                                               .replay = ReplayPairing::cache};
 
     /// Iterations of one sample: stress renders any number of them.
-    static std::vector<Stressed> stress() { return {{"bdpt-guided", {{"guide_samples", "1"}}, false}}; }
+    static std::vector<Stressed> stress() {
+        return {{"bdpt-guided", {{"guide_samples", "1"}, {"guide_sides", "both"}}, false}};
+    }
 };
 
 }  // namespace ambilux

@@ -1,4 +1,4 @@
-// A method whose eye subpaths sample directions from what it has learned about where light comes from (Müller, Gross
+// A method whose subpaths sample directions from what it has learned about where light comes from (Müller, Gross
 // and Novák 2017, "Practical Path Guiding for Efficient Light-Transport Simulation"; Müller 2019, "Path Guiding in
 // Production", chapter 10; Rath et al. 2020, "Variance-Aware Path Guiding").
 #pragma once
@@ -19,7 +19,7 @@ template <Features F, class Tracer, Fusion kFusion, class Method>
 struct GuidedOf {
     using Unguided = Method;
     using Mis = typename Method::Mis;
-    using State = GuidedState;
+    using State = GuidedStates;
     static constexpr bool kFilmWide = Method::kFilmWide;
     static constexpr uint32_t kPhases = kGuideRounds + 1;
     static constexpr uint32_t kTrainingPaths = 1u << 20;  ///< of an iteration, at most
@@ -69,7 +69,8 @@ struct GuidedOf {
         GenerateTraining<GenerateGuided<GenerateEye<F, Mis>>> generate_training;
         RecordRays<Mis> record[2];
         LearnRecords learn;
-        GuideStep update;
+        LearnImportance<F, Mis> importance[2];
+        GuideStep update[2];  ///< by side
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& policy, const Memory& m, const State& all)
             : Stages(parts, m, all.around(parts.scene), policy) {}
@@ -78,8 +79,8 @@ struct GuidedOf {
         Stages of_round(uint32_t round) const {
             Stages s = *this;
             number_training(s.train, round);
-            s.generate_training.wave.first_key = s.learn.wave.first_key =
-                (round + 1) * s.learn.wave.width * s.learn.wave.height;
+            for (Wave* wave : {&s.generate_training.wave, &s.learn.wave, &s.importance[0].wave, &s.importance[1].wave})
+                wave->first_key = (round + 1) * wave->width * wave->height;
             s.generate_training.round = round;
             s.generate_training.share = s.learn.share =
                 min(s.learn.training.shift + kGuideRounds - 1 - round, kMostShift);
@@ -89,8 +90,8 @@ struct GuidedOf {
 
     private:
         static Policy guided_by(Policy p, const State& s) {
-            p.rules.directions = {s.tree, p.guided.roulette};
-            p.rules.mis.tree = s.tree;
+            p.rules.mis.trees = followed<Mis::kBidirectional>(s, p.guided);
+            p.rules.directions = {p.rules.mis.trees, p.guided.roulette};
             return p;
         }
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& s, const Policy& p)
@@ -99,19 +100,27 @@ struct GuidedOf {
             const auto note = [&](const char* name) { return parts.layout.record(name); };
             const Lane* const samples = parts.film.samples;
             static_cast<GenerateEye<F, Mis>&>(generate) = render.generate;
-            generate.over_pixel = s.over_pixel;
+            generate.over_pixel = s.eye.over_pixel;
             generate.training = p.training;
             generate.made = m.records.made;
             static_cast<GenerateGuided<GenerateEye<F, Mis>>&>(generate_training) = generate;
             static_cast<GenerateEye<F, Mis>&>(generate_training) = train.generate;
             generate_training.record = note("train_generate");
-            generate_training.progress = s.progress;
+            generate_training.progress = s.eye.progress;
             for (int k = 0; k < 2; ++k)
-                record[k] = {parts.wave, p.training, m.method.subpaths.hits[k],
-                             m.records,  samples,    note(RecordRays<Mis>::kName),
-                             s.progress};
-            learn = {parts.wave, p.training, p.guided, s, m.records, samples, note(LearnRecords::kName)};
-            update = {s, p.guided, note(GuideStep::kName)};
+                record[k] = {parts.wave,    p.training, m.method.subpaths.hits[k],
+                             m.records,     samples,    note(RecordRays<Mis>::kName),
+                             s.eye.progress};
+            learn = {{parts.wave, p.training, p.guided, s.eye, note(LearnRecords::kName)}, m.records, samples};
+            update[0] = {s.eye, p.guided, note(GuideStep::kName)};
+            if (!s.has_light()) return;
+            update[1] = {s.light, p.guided.of_light(), update[0].record};
+            for (int k = 0; k < 2; ++k)
+                importance[k] = {
+                    {parts.wave, p.training, update[1].settings, s.light, note(LearnImportance<F, Mis>::kName)},
+                    parts.scene,
+                    m.method.subpaths.hits[k],
+                    s.eye.progress};
         }
     };
 
@@ -146,15 +155,20 @@ private:
     template <bool kFused, class Executor, class Paths, class Generate>
     static void paths(Executor& exec, const Stages& s, const Paths& p, const Generate& generate) {
         if (s.render.policy.rules.max_depth == 0) return;
-        Method::template wave<kFused>(exec, p, generate,
-                                      [&](int k, const auto&) { exec.for_each(s.record[k], s.record[k].hits); });
+        const GuidedSettings& guided = s.learn.settings;
+        Method::template wave<kFused>(exec, p, generate, [&](int k, const auto&) {
+            if (guided.guides(Side::eye)) exec.for_each(s.record[k], s.record[k].hits);
+            if constexpr (Mis::kBidirectional)
+                if (guided.guides(Side::light)) exec.for_each(s.importance[k], s.importance[k].hits);
+        });
         exec.run_slots(s.learn, s.render.wave.tiles * kTilePixels >> s.learn.training.shift);
     }
     template <class Executor>
     static void learn(Executor& exec, const Stages& s, uint32_t round) {
-        GuideStep step = s.update;
-        step.round = round;
-        GuideUpdate::of(step).run(exec);
+        for (GuideStep step : s.update) {
+            step.round = round;
+            if (step.state.most_leaves > 0) GuideUpdate::of(step).run(exec);
+        }
     }
 };
 

@@ -109,21 +109,54 @@ struct RecordRays {
     }
 };
 
-/// Adds the records of the slot that trains in a group to the sums of the trees.
-struct LearnRecords {
-    static constexpr const char* kName = "guide_learn";
+/// Adds to the sums of a tree.
+struct GuideAdds {
     /// Of the mean in units, and the most that one value counts: sums of 2^25 such values are no more than integers
     /// hold.
     static constexpr float kMean = 0x1p16f, kMost = 0x1p38f;
-    static constexpr float kWeight = 0x1p8f;  ///< units of a weight
 
     Wave wave;
     GuideTraining training;
     GuidedSettings settings;
     GuidedState state;
+    StageRecord* record;
+
+protected:
+    /// `value` in units of `sum`; while there is no unit, of its kind, it is what one will be made of, and 0.
+    AMBILUX_HD float in_units(GuideSum sum, float value) const {
+        const float unit = state.progress->unit[uint32_t(sum)];
+        if (unit > 0.0f) return value / unit;
+        if (value > 0.0f)
+            fetch_add_shared(
+                state.exponents + uint32_t(sum) * GuidedState::kExponents + (float_bits(value) >> kFractionBits), 1);
+        return 0.0f;
+    }
+    /// `value` to the cell at `place`, or to one that it is spread to. `number`: among what the path of `slot` adds.
+    AMBILUX_HD void add_to_cell(uint32_t slot, uint32_t number, uint32_t leaf, Vec2f place, GuideQuads::Cell cell,
+                                float value) const {
+        const float units = min(in_units(GuideSum::target, value), kMost);
+        if (!(units >= 1.0f)) return;
+        if (settings.filter) {
+            // Blocks of random numbers beyond those of RandomNumbers.
+            constexpr uint32_t kFirstBlock = 0x20000u;
+            const Vec4f u = random_floats(wave.key(slot), kFirstBlock + number);
+            const float side = GuideQuads::side(cell.level), y = place.y + side * (u.y - 0.5f);
+            cell = state.tree.quads.cell(leaf, {clamp(place.x + side * (u.x - 0.5f), 0.0f, kOneMinusEpsilon),
+                                                clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)});
+        }
+        const uint64_t sum = (leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
+        fetch_add_shared(state.found + sum, 1);
+        fetch_add_shared(state.sums + sum, int64_t(units));
+    }
+};
+
+/// Adds the records of the slot that trains in a group to the sums of the tree of eye subpaths.
+struct LearnRecords : GuideAdds {
+    static constexpr const char* kName = "guide_learn";
+    static constexpr float kWeight = 0x1p8f;  ///< units of a weight
+
     GuideRecords records;
     const Lane* samples;
-    StageRecord* record;
     uint32_t share = 0;  ///< as of GenerateTraining
     uint32_t round = kGuideRounds;
 
@@ -144,21 +177,12 @@ struct LearnRecords {
             if (found == 0.0f) continue;
             const GuideQuads::Cell cell = state.tree.quads.cell(r.leaf, r.place());
             learn_share(r, squared, cell.density);
-            learn(slot, k, r, cell,
-                  settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.whole * r.pdf_sa));
+            add_to_cell(slot, k, r.leaf, r.place(), cell,
+                        settings.target == GuideTarget::moment ? squared * r.pdf_sa : found / (r.whole * r.pdf_sa));
         }
     }
 
 private:
-    /// `value` in units of `sum`; while there is no unit, of its kind, it is what one will be made of, and 0.
-    AMBILUX_HD float in_units(GuideSum sum, float value) const {
-        const float unit = state.progress->unit[uint32_t(sum)];
-        if (unit > 0.0f) return value / unit;
-        if (value > 0.0f)
-            fetch_add_shared(
-                state.exponents + uint32_t(sum) * GuidedState::kExponents + (float_bits(value) >> kFractionBits), 1);
-        return 0.0f;
-    }
     /// A radiance to a sum of `weight` and of the radiances.
     AMBILUX_HD void add(int64_t* sum, float radiance, float weight) const {
         const float units = in_units(GuideSum::radiance, radiance);
@@ -179,21 +203,56 @@ private:
                              int64_t(min(units * (r.pdf_sa / pdf_sa), GuideShares::kMost)));
         }
     }
-    AMBILUX_HD void learn(uint32_t slot, uint32_t k, const GuideRecord& r, GuideQuads::Cell cell, float value) const {
-        const float units = min(in_units(GuideSum::target, value), kMost);
-        if (!(units >= 1.0f)) return;
-        if (settings.filter) {
-            // Blocks of random numbers beyond those of RandomNumbers.
-            constexpr uint32_t kFirstBlock = 0x20000u;
-            const Vec4f u = random_floats(wave.key(slot), kFirstBlock + k);
-            const Vec2f d = r.place();
-            const float side = GuideQuads::side(cell.level), y = d.y + side * (u.y - 0.5f);
-            cell = state.tree.quads.cell(r.leaf, {clamp(d.x + side * (u.x - 0.5f), 0.0f, kOneMinusEpsilon),
-                                                  clamp(y - floorf(y), 0.0f, kOneMinusEpsilon)});
+};
+
+/// Over the hits of a depth: the importance that eye subpaths bring there is learned in the tree of light subpaths, in
+/// the direction that it came from (Vorba et al. 2014, "On-line Learning of Parametric Mixture Models for Light
+/// Transport Simulation"). It counts by what its pixel is expected to be, so that dark ones count as bright ones do.
+template <Features F, class Mis>
+struct LearnImportance : GuideAdds {
+    static constexpr const char* kName = "guide_importance";
+    using Items = SubpathItems<Mis>;
+    using RayItem = typename Items::Ray;
+
+    SceneView scene;
+    Queue<HitItem<RayItem>> hits;
+    const GuideProgress* eye;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const uint32_t depth = wave.state->depth;
+        // Where the camera sees something no direction leads to the camera.
+        if (depth < 2 || depth - 2 >= GuideTraining::kDepths || !training.learns(*state.progress)) return;
+        const HitItem<RayItem> hit = hits.load(i);
+        if (hit.prim == kNone || !training.trains(wave, hit.ray.path)) return;
+        const Subpath<Mis> path = Items::unpack(hit.ray);
+        // Over the mean of all pixels, so that values are alike before it is known.
+        const float of_mean = path.sums.over_pixel * kMean * eye->unit[uint32_t(GuideSum::radiance)],
+                    value = recorded_luminance(path.throughput) * (of_mean > 0.0f ? of_mean : 1.0f);
+        if (!(value < kInfinity)) return;
+        const SurfacePoint point = surface_at<F>(scene, hit.prim, hit.u, hit.v);
+        const uint32_t leaf = state.tree.leaf(point.p);
+        const Vec2f place = square_of_direction(-path.direction);
+        const GuideQuads::Cell cell = state.tree.quads.cell(leaf, place);
+        if (training.trains(wave, hit.ray.path, training.shift + kLearnShare))
+            learn_share(leaf, fabsf(dot(point.ng, path.direction)), cell.density, value);
+        add_to_cell(hit.ray.path, GuideTraining::kDepths + depth - 2, leaf, place, cell, value);
+    }
+
+private:
+    static constexpr uint32_t kLearnShare = 2;  ///< one of 2^this slots that train
+
+    /// How unlikely the direction was by other shares of the BSDF (GuideShares): the mean is least for what is most
+    /// like the importance that arrives. What a light subpath would bring is not known here, nor from where; the BSDF
+    /// counts as a diffuse one.
+    AMBILUX_HD void learn_share(uint32_t leaf, float cosine, float density, float value) const {
+        constexpr float kMostBits = 2.0f * GuideQuads::kLevels, kLeast = 0x1p-16f;
+        if (!settings.learn_share || state.tree.leaves[leaf].bsdf_share == 1.0f) return;
+        const float units = min(in_units(GuideSum::target, value), GuideShares::kMost);
+        for (uint32_t k = 0; k < GuideShares::kCount; ++k) {
+            const float share = GuideShares::of(k), here = share * 4.0f * cosine + (1.0f - share) * density;
+            fetch_add_shared(state.shares + leaf * GuideShares::kCount + k,
+                             int64_t(units * (kMostBits - log2f(max(here, kLeast)))));
         }
-        const uint64_t place = (r.leaf * GuideQuads::kNodes + cell.node) * 4ull + cell.quadrant;
-        fetch_add_shared(state.found + place, 1);
-        fetch_add_shared(state.sums + place, int64_t(units));
     }
 };
 

@@ -39,8 +39,17 @@ std::vector<Declaration<GuidedSettings>> GuidedVariant::settings() {
     };
 }
 
+std::vector<Declaration<GuidedSettings>> GuidedSidesVariant::settings() {
+    auto all = GuidedVariant::settings();
+    all.push_back(Declare<GuidedSettings>::choice(
+        "guide_sides", &GuidedSettings::sides, {"eye", "light", "both"},
+        "which subpaths are guided: those of the eye by where light comes from, those of light by where what the "
+        "camera sees comes from; both have half of guide_leaves each"));
+    return all;
+}
+
 GuidedSettings GuidedSettings::plan(const RenderSettings& settings) {
-    return own_settings(GuidedVariant::settings(), settings);
+    return own_settings(GuidedSidesVariant::settings(), settings);
 }
 
 }  // namespace ambilux

@@ -48,8 +48,8 @@ struct alignas(16) GuideProgress {
     int64_t found;           ///< by it: records that brought something
 };
 
+/// Of one tree.
 struct GuidedState {
-    static constexpr StateKind kKind = StateKind::per_device;
     static constexpr uint32_t kExponents = 256;
 
     GuideTree tree;
@@ -68,9 +68,8 @@ struct GuidedState {
     ScanMemory scan;
     uint32_t most_leaves, tile_count;
 
-    template <class Policy>
-    static GuidedState lay_out(Layout& layout, const Policy& p, const StateSize& size) {
-        const uint32_t n = p.guided.most_leaves, nodes = n * GuideQuads::kNodes;
+    static GuidedState lay_out(Layout& layout, uint32_t n, uint32_t tiles, const StateSize& size) {
+        const uint32_t nodes = n * GuideQuads::kNodes;
         GuidedState s{};
         s.tree.space = layout.allocate<uint32_t>(2 * n);
         s.tree.grid = layout.allocate<uint32_t>(GuideTree::kGridCells);
@@ -83,7 +82,7 @@ struct GuidedState {
         s.records = layout.allocate<int64_t>(n);
         s.shares = layout.allocate<int64_t>(n * GuideShares::kCount);
         s.reflected = layout.allocate<int64_t>(2 * n);
-        s.tile_count = p.training.tiles;
+        s.tile_count = tiles;
         s.tiles = layout.allocate<int64_t>(2 * s.tile_count);
         s.over_pixel = layout.allocate<float>(s.tile_count);
         s.exponents = layout.allocate<int64_t>(kGuideSums * kExponents);
@@ -101,8 +100,8 @@ struct GuidedState {
         s.tree.inverse_side = size > 0.0f ? 0.5f / size : 0.0f;
         return s;
     }
-    template <class Policy, class Put>
-    void init(const Policy&, Put put) const {
+    template <class Put>
+    void init(Put put) const {
         put(tree.space, std::vector<uint32_t>{GuideTree::kLeafBit});
         put(tree.grid, std::vector<uint32_t>(GuideTree::kGridCells, GuideTree::kLeafBit));
         put(tree.leaves, std::vector<GuideLeaf>{{0, 0, 1, 1.0f, 0.0f}});
@@ -123,6 +122,35 @@ struct GuidedState {
         visit("guide_tiles", tiles, uint64_t(2 * tile_count));
         visit("guide_over_pixel", over_pixel, uint64_t(tile_count));
         visit("guide_exponents", exponents, uint64_t(kGuideSums * kExponents));
+    }
+};
+
+/// Of the trees of both sides. Of light subpaths that are not guided there is none; that of eye subpaths knows what
+/// pixels are expected to be all the same.
+struct GuidedStates {
+    static constexpr StateKind kKind = StateKind::per_device;
+
+    GuidedState eye, light;
+
+    template <class Policy>
+    static GuidedStates lay_out(Layout& layout, const Policy& p, const StateSize& size) {
+        GuidedStates s{};
+        s.eye = GuidedState::lay_out(layout, p.guided.leaves_of(Side::eye), p.training.tiles, size);
+        if (p.guided.guides(Side::light))
+            s.light = GuidedState::lay_out(layout, p.guided.leaves_of(Side::light), 0, size);
+        return s;
+    }
+    GuidedStates around(const SceneView& scene) const { return {eye.around(scene), light.around(scene)}; }
+    bool has_light() const { return light.most_leaves > 0; }
+    template <class Policy, class Put>
+    void init(const Policy&, Put put) const {
+        eye.init(put);
+        if (has_light()) light.init(put);
+    }
+    template <class Visit>
+    void for_each_saved(Visit visit) const {
+        eye.for_each_saved(visit);
+        if (has_light()) light.for_each_saved(visit);
     }
 };
 

@@ -241,7 +241,7 @@ struct FillGrid : GuideStep {
 struct UpdateTiles : GuideStep {
     AMBILUX_HD void operator()(uint32_t tile) const {
         const int64_t* sums = state.tiles + 2 * tile;
-        if (progress().updating && sums[1] > 0) state.over_pixel[tile] = 1.0f / mean_radiance(sums);
+        if (is_due() && sums[1] > 0) state.over_pixel[tile] = 1.0f / mean_radiance(sums);
     }
 };
 
@@ -300,7 +300,7 @@ struct GuideUpdate {
         exec.for_each(split, s.most_leaves);
         exec.for_each(copy, s.most_leaves);
         exec.for_each(grid, GuideTree::kGridCells);
-        exec.for_each(tiles, s.tile_count);
+        if (s.tile_count > 0) exec.for_each(tiles, s.tile_count);
         exec.for_each(end, 1);
     }
 };

@@ -1,4 +1,4 @@
-// What all guided variants have.
+// What guided variants have.
 #pragma once
 
 #include "integrators/setting.h"
@@ -7,6 +7,10 @@
 namespace ambilux {
 
 struct GuidedVariant {
+    static std::vector<Declaration<GuidedSettings>> settings();
+};
+/// And those whose light subpaths may be guided.
+struct GuidedSidesVariant {
     static std::vector<Declaration<GuidedSettings>> settings();
 };
 
