@@ -1,5 +1,5 @@
 // The same weights by least squares. With weights of the balance heuristic, a sample Y of a vertex and variates Z_k
-// without mean, Y + Σ a_k Z_k has the least variance where the a_k are minus the regression of Y on Z. In the limit
+// of mean zero, Y + Σ a_k Z_k has the least variance where the a_k are minus the regression of Y on Z. In the limit
 // they are those of densities.h wherever vertices are alike, and the best for vertices that are not; their error goes
 // with the variance that is left, not with that which there was.
 #pragma once

@@ -24,7 +24,7 @@ struct GenerateRecorded : Generate {
     }
 };
 
-/// What optimal weights add to those of the balance heuristic at a vertex, over its scale. A variate without mean: of
+/// What optimal weights add to those of the balance heuristic at a vertex, over its scale. A variate of mean zero: of
 /// what a sample has found, other strategies get a part in proportion to their densities, and the pick of a strategy is
 /// weighed against its probability.
 AMBILUX_HD Rgb optimal_difference(const VertexStrategies& v, const EmitterStrategies& all, const Lane* advantages) {

@@ -43,8 +43,8 @@ std::vector<Declaration<GuidedSettings>> GuidedSidesVariant::settings() {
     auto all = GuidedVariant::settings();
     all.push_back(Declare<GuidedSettings>::choice(
         "guide_sides", &GuidedSettings::sides, {"eye", "light", "both"},
-        "which subpaths are guided: those of the eye by where light comes from, those of light by where what the "
-        "camera sees comes from; both have half of guide_leaves each"));
+        "which subpaths are guided: eye subpaths by where light comes from, light subpaths by where importance comes "
+        "from; with both, each side has half of guide_leaves"));
     return all;
 }
 
