@@ -69,8 +69,8 @@ struct GuidedOf {
         GenerateTraining<GenerateGuided<GenerateEye<F, Mis>>> generate_training;
         RecordRays<Mis> record[2];
         LearnRecords learn;
-        LearnImportance<F, Mis> importance[2];
-        GuideStep update[2];  ///< by side
+        LearnImportance<F, Mis> importance[2] = {};
+        GuideStep update[2] = {};  ///< by side
 
         [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& policy, const Memory& m, const State& all)
             : Stages(parts, m, all.around(parts.scene), policy) {}
