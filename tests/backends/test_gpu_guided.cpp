@@ -69,14 +69,20 @@ TEST_CASE("guided bdpt: CPU and CUDA agree with lvc, and training brings nothing
         s.integrator = lvc.integrator = "bdpt";
         s.deterministic = false;
         lvc.variant = "lvc";
-        s.backend = lvc.backend = "cuda";
-        const Estimate image = render_batches(scene, s, 2048);
-        const ZTestResult z = z_test(image, render_batches(scene, lvc, 2048));
-        INFO(z.report());
-        CHECK(z.pass);
-        s.backend = "cpu";
-        const ZTestResult on_cpu = z_test(image, render_batches(scene, s, 512));
-        INFO(on_cpu.report());
-        CHECK(on_cpu.pass);
+        lvc.backend = "cuda";
+        const Estimate truth = render_batches(scene, lvc, 2048);
+        for (const char* sides : {"eye", "both"}) {
+            INFO(sides);
+            apply_setting(s, "guide_sides", sides);
+            s.backend = "cuda";
+            const Estimate image = render_batches(scene, s, 2048);
+            const ZTestResult z = z_test(image, truth);
+            INFO(z.report());
+            CHECK(z.pass);
+            s.backend = "cpu";
+            const ZTestResult on_cpu = z_test(image, render_batches(scene, s, 512));
+            INFO(on_cpu.report());
+            CHECK(on_cpu.pass);
+        }
     }
 }
