@@ -142,7 +142,7 @@ def doubt_of_batches(groups, whole=(), different=DIFFERENT):
         return "few samples decide"
     ratio = averaging(groups, whole)
     if ratio >= AVERAGING:
-        return f"batches do not average out (×{ratio:.1f})"
+        return f"batches do not average out (factor {ratio:.1f})"
     if len(groups) > 1 and min(map(len, groups)) > 1 and np.ptp(values) > 0 and kruskal(*groups).pvalue < different:
         return "seeds differ"
     return ""

@@ -36,7 +36,7 @@ def test_reasons_are_named():
     assert heavy_tails.doubt_of_batches(steady, [1.0, 1.0, 1.0]) == ""
     assert heavy_tails.doubt_of_batches([steady[0]], [1.0]) == "16 batches"
     assert heavy_tails.doubt_of_batches([[*steady[0][:-1], 4.0], *steady[1:]], [1.0] * 3) == "few samples decide"
-    assert heavy_tails.doubt_of_batches(steady, [16.0] * 3) == "batches do not average out (×16.0)"
+    assert heavy_tails.doubt_of_batches(steady, [16.0] * 3) == "batches do not average out (factor 16.0)"
     assert heavy_tails.doubt_of_batches([[2 * x for x in steady[0]], *steady[1:]], [2.0, 1.0, 1.0]) == "seeds differ"
     assert heavy_tails.doubt_of_batches([], []) == "no batches"
     assert heavy_tails.doubt_of_seeds([1.0]) == "1 seed" and heavy_tails.doubt_of_seeds([1.0, 1.1]) == "2 seeds"
@@ -97,7 +97,7 @@ def test_seeds_that_are_slow_together_are_pairs():
 
 def test_of_two_values_that_nothing_supports_that_of_the_whole_image_is_shown():
     """Batches that each miss the same light look better than their image is."""
-    batches, seeds = (heavy_tails.unknown(value, over, 3, doubt) for value, over, doubt in ((34.4, "batches", "batches do not average out (×3.6)"), (9.9, "seeds", "2 seeds")))
+    batches, seeds = (heavy_tails.unknown(value, over, 3, doubt) for value, over, doubt in ((34.4, "batches", "batches do not average out (factor 3.6)"), (9.9, "seeds", "2 seeds")))
     shown = efficiency.lead(batches, seeds)
-    assert (shown.value, shown.doubt) == (9.9, "batches do not average out (×3.6)")
+    assert (shown.value, shown.doubt) == (9.9, "batches do not average out (factor 3.6)")
     assert efficiency.lead(None, seeds) is seeds and efficiency.lead(batches, None) is batches
