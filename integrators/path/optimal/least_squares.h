@@ -101,9 +101,9 @@ struct LeastSquaresSums {
             all_lacking += picks[k] + hits[k];
         }
         const auto moment = [&](uint32_t i, uint32_t j) {
-            double lacks = i == 0 ? all_lacking : 0.0;
-            if (i > 0 && (j == 0 || j == i)) lacks = hits[i - 1] + (j == i ? picks[i - 1] : 0.0);
-            return sums[product(count, i, j)] + lacks;
+            double lacking = i == 0 ? all_lacking : 0.0;
+            if (i > 0 && (j == 0 || j == i)) lacking = hits[i - 1] + (j == i ? picks[i - 1] : 0.0);
+            return sums[product(count, i, j)] + lacking;
         };
         double root[kMost][kMost] = {}, solution[kMost][3] = {};  // Cholesky; a variate without variance is left out
         for (uint32_t i = 0; i < count; ++i) {
