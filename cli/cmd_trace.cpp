@@ -121,8 +121,9 @@ void add_trace(CLI::App& app, Run& run) {
         "--guide", o->guide,
         "Variants guided: write pictures (EXR) of the densities that were learned at the vertices of the "
         "eye subpath, and print what the trees are like");
-    command.add_option("--guide-side", o->guide_side,
-                       "Whose: eye, what was learned about light, or light, what was learned about importance");
+    command.add_option(
+        "--guide-side", o->guide_side,
+        "With --guide: trees that eye subpaths follow (eye, incident radiance) or light subpaths (light, importance)");
     command.add_option("--json", o->json, "Write the replay to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return trace(*o); }; });
 }

@@ -64,10 +64,10 @@ const std::map<std::string, std::string> kNames = {
     {"KHR_node_visibility", "visible"},
     {"KHR_texture_transform", "offset rotation scale texCoord"}};
 
-/// Properties whose values are texts; those of all others that kNames has are numbers, objects or lists of either.
-const document::Plugins kTexts = {"copyright", "generator",  "version",       "minVersion",        "type",   "uri",
-                                  "mimeType",  "alphaMode",  "mode",          "extensionsUsed",    "filter", "name",
-                                  "extras",    "targetPath", "interpolation", "extensionsRequired"};
+/// Properties of kNames whose values are texts or lists of them.
+const document::Plugins kTexts = {"copyright", "generator", "version",        "minVersion",
+                                  "type",      "uri",       "mimeType",       "alphaMode",
+                                  "mode",      "filter",    "extensionsUsed", "extensionsRequired"};
 
 bool is_extension(std::string_view kind) { return kind.starts_with("KHR_") || kind.starts_with("EXT_"); }
 
@@ -136,7 +136,8 @@ private:
         const size_t value = json.find_first_not_of(" \t\r\n[", behind + 1);
         if (of && of != &kExtensions && value != std::string_view::npos && json[value] == '"' && has(*of, key) &&
             !document::is_one_of(kTexts, key))
-            context.fail(fmt::format("property '{}' of {} is a text, not a number", key, called(*of)));
+            context.fail(
+                fmt::format("property '{}' of {} is a text, which glTF does not allow there", key, called(*of)));
         return end;
     }
 

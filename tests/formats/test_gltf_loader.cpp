@@ -328,11 +328,13 @@ TEST_CASE("files that lie are refused") {
     CHECK(contains(changed([](Json& j) { j["asset"]["minVersion"] = "2.1"; }), "it asks for glTF 2.1"));
     // tinygltf would take the default instead.
     CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["metallicFactor"] = "0.5"; }),
-                   "property 'metallicFactor' of pbrMetallicRoughness is a text, not a number"));
+                   "property 'metallicFactor' of pbrMetallicRoughness is a text, which glTF does not allow there"));
     CHECK(contains(changed([](Json& j) { j["materials"][0]["extensions"]["KHR_materials_ior"]["ior"] = "1.7"; }),
-                   "property 'ior' of KHR_materials_ior is a text, not a number"));
+                   "property 'ior' of KHR_materials_ior is a text, which glTF does not allow there"));
+    CHECK(contains(changed([](Json& j) { j["materials"][0]["doubleSided"] = "true"; }),
+                   "property 'doubleSided' of material is a text"));
     CHECK(contains(changed([](Json& j) { j["materials"][0]["emissiveFactor"] = {"1", "1", "1"}; }),
-                   "property 'emissiveFactor' of material is a text, not a number"));
+                   "property 'emissiveFactor' of material is a text, which glTF does not allow there"));
     // tinygltf would leave out the whole material.
     CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1}; }),
                    "baseColorFactor"));

@@ -137,7 +137,7 @@ TEST_CASE("A diffuse room, glass, and all materials have the expectation of bdpt
 TEST_CASE("So has a strongly guided room whose strategies are off one group after the other") {
     const Scene scene = project_scene("cornell", 24, 24);
     const Estimate truth = lvc(scene, 1024);
-    for (const char* sides : {"eye", "both"})
+    for (const char* sides : kSides)
         for (const char* strategies : {"hits+next_event+connections", "hits+light+connections",
                                        "next_event+light+connections", "hits+next_event+light"}) {
             INFO(sides << " " << strategies);
